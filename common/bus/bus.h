@@ -1,0 +1,84 @@
+#pragma once
+/// The bus: payloads in and out of named topics, over one of three vendors chosen at run time.
+///
+/// A payload is plain CDR with its 4-byte encapsulation header, exactly as it stands on the wire, so any
+/// topic can be recorded without knowing its type.  The typed face is common/wire/endpoint.h.
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "idl/topics.h"
+
+namespace hamel::bus {
+
+enum class Vendor : std::uint8_t { inproc, fastdds, cyclonedds };
+const char* to_string(Vendor v);
+
+using Payload = std::vector<std::byte>;
+
+struct NodeOptions {
+  Vendor vendor = Vendor::inproc;
+  std::uint32_t domain = 31;               ///< DDS domain, 0..232; inproc: a name space within the process
+  std::string interface_name;              ///< network interface or address; empty: loopback only
+  std::vector<std::string> peers;          ///< unicast addresses; empty: multicast where the interface has it
+  std::string name = "hamel";              ///< shown by tools
+};
+
+/// What happened to one end of a topic since it was made.
+struct Counters {
+  std::uint64_t samples = 0;               ///< written or taken
+  std::uint64_t lost = 0;                  ///< the bus says it dropped these
+  std::uint64_t refused = 0;               ///< larger than Topic::max_bytes, or an unknown encapsulation
+  std::uint64_t incompatible = 0;          ///< peers whose QoS cannot match ours (each also logged once)
+};
+
+class Writer {
+ public:
+  virtual ~Writer() = default;
+  /// Sends a payload.  False when the bus refused it (counted).  Never waits for a reader.
+  virtual bool write(std::span<const std::byte> payload) = 0;
+  virtual int matched() const = 0;         ///< readers known now
+  virtual Counters counters() const = 0;
+};
+
+class Reader {
+ public:
+  virtual ~Reader() = default;
+  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits.
+  virtual bool take(Payload& payload) = 0;
+  virtual int matched() const = 0;         ///< writers known now
+  virtual Counters counters() const = 0;
+};
+
+/// One participant.  Threads: wait() and take() belong to the owner's thread, wake() to any.  Writers and
+/// readers must go before their node.
+class Node {
+ public:
+  virtual ~Node() = default;
+  virtual std::unique_ptr<Writer> writer(const Topic& topic) = 0;
+  virtual std::unique_ptr<Reader> reader(const Topic& topic) = 0;
+  /// Waits until a sample arrived or wake() was called since the last wait(), or until the deadline.
+  /// True when woken.  Middleware threads only notify; user code runs here, on the owner's thread.
+  virtual bool wait(std::chrono::steady_clock::time_point deadline) = 0;
+  virtual void wake() noexcept = 0;
+  virtual const NodeOptions& options() const = 0;
+};
+
+/// Opens a node, or says in one sentence what is wrong: interface absent or down, domain out of range, no free
+/// participant index, vendor's own refusal.
+Result<std::unique_ptr<Node>, Problem> open(const NodeOptions& options);
+
+/// "fastdds" -> Vendor; the error lists the names.
+Result<Vendor, Problem> vendor_from(std::string_view name);
+
+/// The vendor used where none is asked for by services in their own processes (chosen by measurement, see
+/// common/bus/README.md).
+inline constexpr Vendor kDefaultNetworkVendor = Vendor::fastdds;
+
+}  // namespace hamel::bus

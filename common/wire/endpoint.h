@@ -1,0 +1,52 @@
+#pragma once
+/// A typed topic: bytes of the bus on one side, checked plain messages on the other.
+
+#include <memory>
+
+#include "common/bus/bus.h"
+#include "common/wire/codec.h"
+
+namespace hamel::wire {
+
+template <class T>
+class Publisher {
+ public:
+  explicit Publisher(bus::Node& node) : writer_(node.writer(topic_of<T>())) {}
+  /// False when the message could not be encoded or the bus refused it.
+  bool publish(const T& m) { return encode(m, buffer_) && writer_->write(buffer_); }
+  int matched() const { return writer_->matched(); }
+
+ private:
+  std::unique_ptr<bus::Writer> writer_;
+  bus::Payload buffer_;
+};
+
+template <class T>
+class Subscription {
+ public:
+  explicit Subscription(bus::Node& node) : reader_(node.reader(topic_of<T>())) {}
+
+  /// The oldest waiting message that decodes; those that do not are counted and dropped.
+  bool take(T& m) {
+    while (reader_->take(buffer_)) {
+      const auto r = decode<T>(buffer_, m);
+      if (r) return true;
+      ++undecodable_;
+      last_error_ = r.error();
+    }
+    return false;
+  }
+
+  int matched() const { return reader_->matched(); }
+  bus::Counters counters() const { return reader_->counters(); }
+  std::uint64_t undecodable() const { return undecodable_; }
+  DecodeError last_error() const { return last_error_; }
+
+ private:
+  std::unique_ptr<bus::Reader> reader_;
+  bus::Payload buffer_;
+  std::uint64_t undecodable_ = 0;
+  DecodeError last_error_;
+};
+
+}  // namespace hamel::wire
