@@ -1,0 +1,65 @@
+#pragma once
+/// One step of an arm through time, by any tier of the dial between speed and accuracy.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/model/chain.h"
+#include "common/scene/options.h"
+
+namespace hamel::dynamics {
+
+using Options = scene::DynamicsOptions;
+using scene::Root;
+using scene::Start;
+using scene::Tier;
+
+enum class Stop : std::uint8_t { converged, stagnated, budget_spent, diverged, explicit_step };
+
+/// How a step went.  When not usable() the state was left untouched.
+struct [[nodiscard]] StepReport {
+  Stop stop = Stop::diverged;
+  int iterations = 0;            ///< updates of the unknown
+  int evaluations = 0;           ///< residual, stage or forward-dynamics evaluations
+  int substeps = 1;              ///< parts the step was divided into
+  double residual_Nm = 0;        ///< largest torque left unbalanced
+  double work_J = 0;             ///< of joint torques, damping and stops over the step, as applied
+  bool usable() const noexcept { return stop != Stop::diverged && stop != Stop::budget_spent; }
+};
+
+/// The arm at one time: all that is needed to go on exactly where it stopped (copy it, save it, load it).
+struct State {
+  std::uint64_t step = 0;
+  Eigen::VectorXd q, p;                          ///< configuration, discrete momentum; n each
+  Eigen::VectorXd qd;                            ///< M^-1 p, kept for those who look; tiers rk4, dopri8 integrate it
+  std::vector<double> history;                   ///< what the start guess uses; meaning known to the tier alone
+};
+
+/// An integrator bound to one chain and one set of options.  Not for two threads at once.
+class Integrator {
+ public:
+  /// `options` must be valid (scene::problems()).  Allocates; nothing after it does.
+  Integrator(const model::Chain& chain, const Options& options);
+  ~Integrator();
+  Integrator(Integrator&&) noexcept;
+
+  /// The state at rest history from q0, qd0: p = M(q0) qd0.
+  State start(const Eigen::VectorXd& q0, const Eigen::VectorXd& qd0) const;
+  /// Advances by dt_s under joint torques `tau` (constant over the step).  O(n) an evaluation.  No allocation, no
+  /// throw, no lock.  On failure the state is untouched and the report says why.
+  StepReport step(State& state, const Eigen::VectorXd& tau) noexcept;
+  /// Torque that holds the arm against gravity at q.
+  void gravity_torque(const Eigen::VectorXd& q, Eigen::VectorXd& tau_g) noexcept;
+  /// E(q, p) [J].
+  double energy(const State& state) noexcept;
+  const model::Chain& chain() const noexcept;
+  const Options& options() const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace hamel::dynamics
