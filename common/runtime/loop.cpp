@@ -4,12 +4,9 @@
 
 namespace hamel::runtime {
 
-bool run(bus::Node& node, std::span<Service* const> services, StopSignal& stop) {
+bool run(bus::Node& node, std::span<Service* const> services, const Service& lead, StopSignal& stop) {
   stop.on_stop([&node] { node.wake(); });
-  const auto all_finished = [&] {
-    return std::all_of(services.begin(), services.end(), [](const Service* s) { return s->finished(); });
-  };
-  while (!stop.requested() && !all_finished()) {
+  while (!stop.requested() && !lead.finished()) {
     bool progressed = false;
     for (Service* s : services) progressed |= s->poll(Clock::now());
     if (progressed) continue;

@@ -25,8 +25,8 @@ class Service {
   virtual void close() {}
 };
 
-/// Polls until every service is finished (true) or a stop was asked for (false); then closes them.
-bool run(bus::Node& node, std::span<Service* const> services, StopSignal& stop);
+/// Polls all services until `lead` is finished (true) or a stop was asked for (false); then closes them.
+bool run(bus::Node& node, std::span<Service* const> services, const Service& lead, StopSignal& stop);
 
 /// Gives the middleware a moment to deliver the last words before the process ends.
 void linger(bus::Node& node);

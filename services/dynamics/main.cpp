@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   auto service = dynamics::DynamicsService::make(*node.value(), scene.value(), config);
   if (!service) return runtime::complain("hamel-dynamics", {service.error()});
   runtime::Service* const services[] = {service.value().get()};
-  runtime::run(*node.value(), services, stop);
+  runtime::run(*node.value(), services, *services[0], stop);
   runtime::linger(*node.value());
 
   switch (service.value()->outcome()) {

@@ -80,7 +80,7 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
       bus_name_(bus::to_string(node.options().vendor)) {
   const double dt = scene.dynamics.dt_s;
   last_step_ = static_cast<std::uint64_t>(std::llround(scene.duration_s / dt));
-  clock_every_ = static_cast<std::uint64_t>(std::max(1.0, std::round(0.01 / dt)));
+  clock_every_ = static_cast<std::uint64_t>(std::max(1.0, std::floor(0.01 / dt + 1e-9)));
   command_ = Eigen::VectorXd::Zero(scene.robot.chain.n());
   hash_.add(arm_.state().step, arm_.state().q, arm_.state().p);
 }

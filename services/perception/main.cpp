@@ -22,6 +22,6 @@ int main(int argc, char** argv) {
   auto service = perception::PerceptionService::make(*node.value(), scene.value());
   if (!service) return runtime::complain("hamel-perception", service.error());
   runtime::Service* const services[] = {service.value().get()};
-  runtime::run(*node.value(), services, stop);
+  runtime::run(*node.value(), services, *services[0], stop);
   return runtime::kDone;
 }
