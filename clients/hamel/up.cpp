@@ -76,7 +76,7 @@ int up(const RunArgs& args) {
   const auto scene = runtime::load(args.run);
   if (!scene) return runtime::complain("hamel up", scene.error());
   const scene::Scene& s = scene.value();
-  auto node = runtime::open_node(args.run.bus, s.bus_dynamics, "hamel-up");
+  auto node = runtime::open_node(args.run.bus, s.bus.dynamics, "hamel-up");
   if (!node) return runtime::complain("hamel up", {node.error()});
   bus::Node& n = *node.value();
   if (n.options().vendor == bus::Vendor::inproc)

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
 
   const auto scene = runtime::load(o);
   if (!scene) return runtime::complain("hamel-dynamics", scene.error());
-  auto node = runtime::open_node(o.bus, scene.value().bus_dynamics, "hamel-dynamics");
+  auto node = runtime::open_node(o.bus, scene.value().bus.dynamics, "hamel-dynamics");
   if (!node) return runtime::complain("hamel-dynamics", {node.error()});
 
   const dynamics::ServiceConfig config{.pace = runtime::pace(o, scene::Pace::realtime),

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
 
   const auto scene = runtime::load(o);
   if (!scene) return runtime::complain("hamel-perception", scene.error());
-  auto node = runtime::open_node(o.bus, scene.value().bus_perception, "hamel-perception");
+  auto node = runtime::open_node(o.bus, scene.value().bus.perception, "hamel-perception");
   if (!node) return runtime::complain("hamel-perception", {node.error()});
 
   auto service = perception::PerceptionService::make(*node.value(), scene.value());

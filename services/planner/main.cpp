@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
 
   const auto scene = runtime::load(o);
   if (!scene) return runtime::complain("hamel-planner", scene.error());
-  auto node = runtime::open_node(o.bus, scene.value().bus_planner, "hamel-planner");
+  auto node = runtime::open_node(o.bus, scene.value().bus.planner, "hamel-planner");
   if (!node) return runtime::complain("hamel-planner", {node.error()});
 
   const planner::ServiceConfig config{.pace = runtime::pace(o, scene::Pace::realtime), .state_dir = o.state_dir};
