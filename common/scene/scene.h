@@ -10,6 +10,7 @@
 #include "common/geometry/shape.h"
 #include "common/model/chain.h"
 #include "common/scene/options.h"
+#include "common/scene/stream.h"
 
 namespace hamel::scene {
 
@@ -26,6 +27,7 @@ struct Robot {
   std::string urdf;                  ///< the file's text, for the wire and for recordings
   model::Chain chain;
   std::vector<LinkShape> shapes;
+  std::vector<std::string> warnings; ///< what was read otherwise than written, e.g. "link hand: mesh left out"
 };
 
 enum class GoalKind : std::uint8_t { position, pose, joints };
@@ -55,13 +57,19 @@ struct Stream {
   double scale = 1;                  ///< of lengths, > 0
   double rate = 1;                   ///< stream seconds per run second, > 0
   double start_s = 0;                ///< stream time at run time 0
-  bool loop = false;
+  bool loop = false;                 ///< starts anew one sample interval after its end
+  std::vector<StreamSample> samples; ///< what the file holds, in stream frame and stream time
 };
 
 struct PerceptionOptions {
   double rate_hz = 30;               ///< obstacle sets per second, > 0; static scenes publish on change
   std::vector<ScriptedObstacle> obstacles;
   std::optional<Stream> stream;
+};
+
+/// The bus each service talks over: "inproc", "fastdds" or "cyclonedds"; empty: whatever the program was told.
+struct Buses {
+  std::string dynamics, planner, perception;
 };
 
 /// One run.
@@ -76,11 +84,19 @@ struct Scene {
   DynamicsOptions dynamics;
   PlannerOptions planner;
   PerceptionOptions perception;
+  Buses bus;
   double duration_s = 10;            ///< length of the run, > 0
   StopRule stop = StopRule::when_reached;
 };
 
-/// Every violated rule across the scene: sizes, options, shapes, streams.  Empty when valid.
+/// Every violated rule across the scene: sizes, options, shapes, streams.  Empty when valid.  `where` is the
+/// path of the field in the text format, e.g. "perception.obstacles[2].sphere.radius_m".
 Problems problems(const Scene& s);
+Problems problems(const PerceptionOptions& o);
+
+/// What is allowed but probably not meant: the robot's warnings and settings that undo each other.
+std::vector<std::string> warnings(const Scene& s);
+
+const char* to_string(GoalKind v);
 
 }  // namespace hamel::scene

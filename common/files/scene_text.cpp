@@ -1,0 +1,138 @@
+#include "common/files/scene_text.h"
+
+#include <scene.pb.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/files/scene_convert.h"
+#include "common/files/text_fields.h"
+
+namespace hamel::files {
+namespace {
+
+/// A scene file on its way to a scene: the message, where its fields stand, what was wrong so far.
+class Loader {
+ public:
+  Loader(const std::string& path, const std::vector<std::string>& overrides) : path_(path), overrides_(overrides) {}
+
+  Checked<scene::Scene> load() {
+    const auto text = read_file(path_);
+    if (!text) return text.error();
+    parse_text(text.value(), path_, message_, parsed_);
+    found_ = parsed_.problems;
+    if (!parsed_.complete) return std::move(found_);
+    for (const std::string& o : overrides_)
+      if (const std::string why = apply_override(o, message_); !why.empty()) found_.push_back({"--set " + o, why});
+    SceneParts parts = to_parts(message_);
+    note(parts.missing);
+    read_stream(parts);
+    return assemble(std::move(parts), text.value());
+  }
+
+ private:
+  /// Adds problems found by path, each at its place in the file or at its override.
+  void note(const Problems& problems) {
+    for (const Problem& p : problems) {
+      const std::string what = p.where + " " + p.what;
+      const auto o = std::find_if(overrides_.rbegin(), overrides_.rend(),
+                                  [&](const std::string& x) { return override_touches(x, p.where); });
+      const TextPosition at = find_position(message_, parsed_.positions, p.where);
+      const auto& mended = parsed_.mended_lines;
+      if (o != overrides_.rend()) found_.push_back({"--set " + *o, what});
+      else if (at.line == 0) found_.push_back({path_ + ":1:1", what});
+      else if (std::find(mended.begin(), mended.end(), at.line) == mended.end())
+        found_.push_back({path_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column), what});
+    }
+  }
+
+  std::string beside(const std::string& file) const {
+    return (std::filesystem::path(path_).parent_path() / file).lexically_normal().string();
+  }
+
+  void read_stream(SceneParts& parts) {
+    if (!parts.perception.stream || parts.perception.stream->path.empty()) return;
+    scene::Stream& s = *parts.perception.stream;
+    s.path = beside(s.path);
+    const auto text = read_file(s.path);
+    if (!text) return note({{"perception.stream.path", "= \"" + s.path + "\": " + text.error().front().what}});
+    auto samples = scene::parse_stream(text.value(), s.path);
+    if (!samples) {
+      found_.insert(found_.end(), samples.error().begin(), samples.error().end());
+      return;
+    }
+    s.samples = std::move(samples).value();
+    if (!parts.stream_start_given) s.start_s = s.samples.front().t_s;
+  }
+
+  std::optional<scene::Robot> read_robot(const SceneParts& parts) {
+    if (message_.robot().urdf().empty()) return {};  // to_parts() has said so
+    const std::string file = beside(message_.robot().urdf());
+    if (!std::filesystem::exists(file)) {
+      note({{"robot.urdf", "= \"" + file + "\": no such file"}});
+      return {};
+    }
+    auto robot = load_urdf(file, parts.place);
+    if (robot) return std::move(robot).value();
+    found_.insert(found_.end(), robot.error().begin(), robot.error().end());
+    return {};
+  }
+
+  /// Puts the robot to the rest and checks the rules; without a robot those that need none.
+  Checked<scene::Scene> assemble(SceneParts parts, const std::string& file_text) {
+    std::optional<scene::Robot> robot = read_robot(parts);
+    if (!robot) {
+      note(scene::problems(parts.dynamics));
+      note(scene::problems(parts.planner));
+      if (stream_was_read(parts)) note(scene::problems(parts.perception));
+      return std::move(found_);
+    }
+    const Eigen::VectorXd q0 = start(parts.q0, robot->chain);
+    const Eigen::VectorXd qd0 = parts.qd0.value_or(Eigen::VectorXd::Zero(robot->chain.n()));
+    scene::Scene s{parts.name,       text_of(file_text), parts.arm,
+                   std::move(*robot), q0,                 qd0,
+                   parts.goal,       parts.steered,      parts.dynamics,
+                   parts.planner,    std::move(parts.perception), parts.bus,
+                   parts.duration_s, parts.stop};
+    if (s.name.empty()) s.name = std::filesystem::path(path_).stem().string();
+    Problems broken = scene::problems(s);
+    if (s.perception.stream && s.perception.stream->samples.empty())  // already said, with the reason
+      std::erase_if(broken, [](const Problem& p) { return p.where == "perception.stream.path"; });
+    note(broken);
+    if (!found_.empty()) return std::move(found_);
+    return s;
+  }
+
+  static bool stream_was_read(const SceneParts& parts) {
+    return !parts.perception.stream || !parts.perception.stream->samples.empty();
+  }
+
+  /// Zero, or the limit nearest to it.
+  static Eigen::VectorXd start(const std::optional<Eigen::VectorXd>& q0, const model::Chain& chain) {
+    if (q0) return *q0;
+    Eigen::VectorXd q(chain.n());
+    for (int i = 0; i < chain.n(); ++i) q[i] = std::clamp(0.0, chain.joint(i).limits.lower, chain.joint(i).limits.upper);
+    return q;
+  }
+
+  std::string text_of(const std::string& file_text) const {
+    if (overrides_.empty()) return file_text;
+    std::string out;
+    google::protobuf::TextFormat::PrintToString(message_, &out);
+    return out;
+  }
+
+  const std::string& path_;
+  const std::vector<std::string>& overrides_;
+  text::Scene message_;
+  ParsedText parsed_;
+  Problems found_;
+};
+
+}  // namespace
+
+Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  return Loader(path, overrides).load();
+}
+
+}  // namespace hamel::files
