@@ -2,13 +2,15 @@
 /// Kinematics and dynamics of a chain: free functions over (const Chain&, ..., Workspace&).
 ///
 /// Order of use: positions() or velocities() fill the workspace for a configuration; everything that takes a
-/// const Workspace& afterwards reads that configuration.  No function here allocates; sizes are the caller's duty
-/// (asserted).  q, qd, tau: n joint values [rad or m], [rad/s or m/s], [N m or N].
+/// const Workspace& afterwards reads that configuration.  No function here allocates, locks or throws; sizes are the
+/// caller's duty (asserted).  q, qd, tau: n joint values [rad or m], [rad/s or m/s], [N m or N].
+/// A row, block or other strided q, qd or tau must be copied to a vector first: Ref would copy it on the heap.
 
 #include <Eigen/Core>
 #include <vector>
 
 #include "common/model/chain.h"
+#include "common/rbd/sweeps.h"
 
 namespace hamel::rbd {
 
@@ -22,6 +24,13 @@ struct Workspace {
   std::vector<lie::Pose> X_PB;     ///< pose of link i in link i-1 (base for i = 0)
   std::vector<lie::Pose> X_WB;     ///< pose of link i in the world
   std::vector<lie::Twist> V_B;     ///< twist of link i in the world, in frame i; Eq. (5)
+
+  // For inverse_dynamics() and forward_dynamics(), in axis frames; no meaning between calls.
+  AxisChain axis;
+  std::vector<LinkPose<double>> X;
+  std::vector<Half6<double>> V, F, c;
+  std::vector<JointFactor<double>> factor;
+  std::vector<double> u;
 };
 
 /// Poses of all links.  Eqs. (3), (4).
@@ -38,11 +47,13 @@ void frame_jacobian(const model::Chain& chain, const Workspace& ws, int link, co
 Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept;
 /// M (n x n, both triangles), armature included.
 void mass_matrix(const model::Chain& chain, const Workspace& ws, Ref<MatrixXd> M) noexcept;
-/// Torque that gravity needs held: tau_g(q) with M qdd + c + tau_g = tau.
+/// Torque that holds the arm against gravity: tau_g(q) = dU/dq, so that M qdd + c + tau_g = tau.
 void gravity_torque(const model::Chain& chain, const Workspace& ws, Ref<VectorXd> tau_g) noexcept;
-/// tau = M(q) qdd + c(q, qd) + tau_g(q), recursive, O(n).  Eqs. (5), (8).  Overwrites the workspace.
+/// tau = M(q) qdd + c(q, qd) + tau_g(q), recursive, O(n).  Eqs. (5), (8).  No joint damping.
+/// tau may be qdd.  What positions() and velocities() left in the workspace stays.
 void inverse_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Ref<const VectorXd> qdd, Workspace& ws, Ref<VectorXd> tau) noexcept;
-/// qdd from tau by the articulated-body sweep, O(n).  Joint damping acts; overwrites the workspace.
+/// qdd from tau by the articulated-body sweep, O(n).  Joint damping acts.  qdd may be tau.
+/// What positions() and velocities() left in the workspace stays.
 void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Ref<const VectorXd> tau, Workspace& ws, Ref<VectorXd> qdd) noexcept;
 /// Kinetic energy [J], armature included.  Needs velocities().
 double kinetic_energy(const model::Chain& chain, const Workspace& ws, Ref<const VectorXd> qd) noexcept;

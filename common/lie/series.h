@@ -1,0 +1,94 @@
+#pragma once
+/// The removable singularities of rotation formulas, all in one home.
+///
+/// Each function takes x = theta^2 >= 0 and is analytic at 0.  Below kSwitch a power series is summed, above it the
+/// closed form in half angles; against 40-digit values both stay within 4 eps (tests/property/series_test.cpp).
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+namespace hamel::lie {
+
+/// theta^2 below which the nine-term series replaces the closed form.
+inline constexpr double kSwitch = 0.5;
+/// The same for coefficients of higher order, whose closed forms cancel more; eighteen terms.
+inline constexpr double kWideSwitch = 9.0;
+
+template <std::size_t N>
+constexpr double horner(const std::array<double, N>& c, double x) noexcept {
+  double r = c[N - 1];
+  for (std::size_t i = N - 1; i-- > 0;) r = r * x + c[i];
+  return r;
+}
+
+/// 1/first!, -1/(first+2)!, 1/(first+4)!, ...
+template <std::size_t N>
+constexpr std::array<double, N> alternating_inverse_factorials(int first) noexcept {
+  std::array<double, N> c{};
+  double f = 1;
+  for (int k = 2; k <= first; ++k) f *= k;
+  for (std::size_t i = 0; i < N; ++i, first += 2) {
+    c[i] = (i % 2 == 0 ? 1.0 : -1.0) / f;
+    f *= static_cast<double>(first + 1) * (first + 2);
+  }
+  return c;
+}
+
+/// sin(theta) / theta.
+inline double sinc(double x) noexcept {
+  static constexpr auto c = alternating_inverse_factorials<9>(1);
+  if (x < kSwitch) return horner(c, x);
+  const double t = std::sqrt(x);
+  return std::sin(t) / t;
+}
+
+/// (1 - cos theta) / theta^2, in the half angle: no cancellation.
+inline double cosc(double x) noexcept {
+  static constexpr auto c = alternating_inverse_factorials<9>(2);
+  if (x < kSwitch) return horner(c, x);
+  const double h = 0.5 * std::sqrt(x), s = std::sin(h) / h;
+  return 0.5 * s * s;
+}
+
+/// (theta - sin theta) / theta^3.
+inline double sinc3(double x) noexcept {
+  static constexpr auto c = alternating_inverse_factorials<9>(3);
+  if (x < kSwitch) return horner(c, x);
+  const double t = std::sqrt(x);
+  return (t - std::sin(t)) / (x * t);
+}
+
+/// (theta^2 / 2 + cos theta - 1) / theta^4.
+inline double cosc4(double x) noexcept {
+  static constexpr auto c = alternating_inverse_factorials<18>(4);
+  if (x < kWideSwitch) return horner(c, x);
+  const double s = std::sin(0.5 * std::sqrt(x));
+  return (0.5 * x - 2 * s * s) / (x * x);
+}
+
+/// (theta^3 / 6 + sin theta - theta) / theta^5.
+inline double sinc5(double x) noexcept {
+  static constexpr auto c = alternating_inverse_factorials<18>(5);
+  if (x < kWideSwitch) return horner(c, x);
+  const double t = std::sqrt(x);
+  return (x * t / 6 + std::sin(t) - t) / (x * x * t);
+}
+
+/// (1 - (theta/2) cot(theta/2)) / theta^2.  Series coefficients |B_2k| / (2k)!.  Pole at theta = 2 pi.
+inline double cotc(double x) noexcept {
+  static constexpr std::array<double, 9> c = {1. / 12,
+                                              1. / 720,
+                                              1. / 30240,
+                                              1. / 1209600,
+                                              1. / 47900160,
+                                              691. / 1307674368000.,
+                                              1. / 74724249600.,
+                                              3617. / 10670622842880000.,
+                                              43867. / 5109094217170944000.};
+  if (x < kSwitch) return horner(c, x);
+  const double h = 0.5 * std::sqrt(x);
+  return (1 - h * std::cos(h) / std::sin(h)) / x;
+}
+
+}  // namespace hamel::lie

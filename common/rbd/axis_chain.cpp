@@ -1,0 +1,45 @@
+#include "common/rbd/axis_chain.h"
+
+namespace hamel::rbd {
+namespace {
+
+/// A rotation whose third column is the unit vector `axis`; the identity where the axis is e_3 already, so that
+/// robots modelled about z keep their digits.
+Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {
+  if (axis == Eigen::Vector3d::UnitZ()) return Eigen::Matrix3d::Identity();
+  Eigen::Index least = 0;
+  axis.cwiseAbs().minCoeff(&least);
+  Eigen::Matrix3d R;
+  R.col(2) = axis.normalized();
+  R.col(0) = Eigen::Vector3d::Unit(least).cross(R.col(2)).normalized();
+  R.col(1) = R.col(2).cross(R.col(0));
+  return R;
+}
+
+}  // namespace
+
+AxisChain::AxisChain(const model::Chain& chain) : gravity_W(lie::vec3(chain.gravity_W_mps2())) {
+  lie::Pose X_PZ = chain.X_WB0();  // parent link's frame seen from the parent's axis frame; the base from the world
+  for (int i = 0; i < chain.n(); ++i) {
+    const model::Joint& joint = chain.joint(i);
+    const model::Inertia& body = chain.link(i).inertia;
+    const Eigen::Matrix3d R_BZ = frame_about(joint.axis);
+    const lie::Pose X = X_PZ * joint.X_PJ;
+    const Eigen::Vector3d c = R_BZ.transpose() * body.com_m;
+    const Eigen::Matrix3d about_com = R_BZ.transpose() * body.about_com_kgm2 * R_BZ;
+    const Eigen::Matrix3d shift = c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose();
+    AxisLink a;
+    a.R_PJ = lie::mat3(X.R * R_BZ);
+    a.p_PJ = lie::vec3(X.p);
+    a.mass = body.mass_kg;
+    a.h = lie::vec3(body.mass_kg * c);
+    a.I_o = lie::sym3(about_com + body.mass_kg * shift);
+    a.damping = joint.damping;
+    a.armature = joint.armature;
+    a.prismatic = joint.kind == model::JointKind::prismatic;
+    links.push_back(a);
+    X_PZ = {R_BZ.transpose(), Eigen::Vector3d::Zero()};
+  }
+}
+
+}  // namespace hamel::rbd

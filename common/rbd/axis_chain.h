@@ -1,0 +1,34 @@
+#pragma once
+/// The chain as the recursions read it: each link's frame turned so that its joint axis is the third axis.
+///
+/// Then A_i = e_3 (revolute) or e_6 (prismatic), A_i^T F picks one number and I_i A_i one column.  Joint values,
+/// torques and energies do not notice; only link-frame quantities would, and those stay in rbd.h's link frames.
+
+#include <vector>
+
+#include "common/lie/vec3.h"
+#include "common/model/chain.h"
+
+namespace hamel::rbd {
+
+/// Constants of one joint and its link.
+struct AxisLink {
+  lie::Mat3<double> R_PJ;       ///< rotation of the frame in its parent's at q = 0
+  lie::Vec3<double> p_PJ;       ///< its origin there [m]
+  lie::Vec3<double> h;          ///< mass times centre of mass [kg m]
+  lie::Sym3<double> I_o;        ///< rotational inertia about the frame's origin [kg m^2]
+  double mass = 0;              ///< [kg]
+  double damping = 0;           ///< [N m s/rad or N s/m]
+  double armature = 0;          ///< [kg m^2 or kg]
+  bool prismatic = false;
+};
+
+struct AxisChain {
+  explicit AxisChain(const model::Chain& chain);
+  std::vector<AxisLink> links;
+  lie::Vec3<double> gravity_W;  ///< [m/s^2]
+  int n() const noexcept { return static_cast<int>(links.size()); }
+  const AxisLink& operator[](int i) const noexcept { return links[static_cast<std::size_t>(i)]; }
+};
+
+}  // namespace hamel::rbd
