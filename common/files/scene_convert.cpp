@@ -8,22 +8,36 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-/// Reads fields of one message by name into variables that hold their defaults; notes lists of a wrong length.
+/// Reads fields of one message by name into variables that hold their defaults; notes lists of a wrong
+/// length.
 class Fields {
  public:
   Fields(const Message& message, std::string prefix, Problems& missing)
       : m_(message), prefix_(std::move(prefix)), missing_(missing) {}
 
-  void operator()(const char* name, double& v) const { if (has(name)) v = r().GetDouble(m_, f(name)); }
-  void operator()(const char* name, int& v) const { if (has(name)) v = r().GetInt32(m_, f(name)); }
-  void operator()(const char* name, bool& v) const { if (has(name)) v = r().GetBool(m_, f(name)); }
-  void operator()(const char* name, std::uint32_t& v) const { if (has(name)) v = r().GetUInt32(m_, f(name)); }
-  void operator()(const char* name, std::uint64_t& v) const { if (has(name)) v = r().GetUInt64(m_, f(name)); }
-  void operator()(const char* name, std::string& v) const { if (has(name)) v = r().GetString(m_, f(name)); }
+  void operator()(const char* name, double& v) const {
+    if (has(name)) v = r().GetDouble(m_, f(name));
+  }
+  void operator()(const char* name, int& v) const {
+    if (has(name)) v = r().GetInt32(m_, f(name));
+  }
+  void operator()(const char* name, bool& v) const {
+    if (has(name)) v = r().GetBool(m_, f(name));
+  }
+  void operator()(const char* name, std::uint32_t& v) const {
+    if (has(name)) v = r().GetUInt32(m_, f(name));
+  }
+  void operator()(const char* name, std::uint64_t& v) const {
+    if (has(name)) v = r().GetUInt64(m_, f(name));
+  }
+  void operator()(const char* name, std::string& v) const {
+    if (has(name)) v = r().GetString(m_, f(name));
+  }
 
-  /// Enumerations of the schema and of common/scene have the same names in the same order (a test compares them).
+  /// Enumerations of the schema and of common/scene have the same names in the same order (a test compares
+  /// them).
   template <class Enum>
-    requires std::is_enum_v<Enum>
+  requires std::is_enum_v<Enum>
   void operator()(const char* name, Enum& v) const {
     if (has(name)) v = static_cast<Enum>(r().GetEnumValue(m_, f(name)));
   }
@@ -137,9 +151,18 @@ geometry::Shape read_shape(const text::Obstacle& m, const std::string& prefix, P
     read("length_m", shape.dims_m[1]);
   };
   switch (m.shape_case()) {
-    case text::Obstacle::kSphere: shape.kind = ShapeKind::sphere; round(m.sphere(), "sphere", false); break;
-    case text::Obstacle::kCapsule: shape.kind = ShapeKind::capsule; round(m.capsule(), "capsule", true); break;
-    case text::Obstacle::kCylinder: shape.kind = ShapeKind::cylinder; round(m.cylinder(), "cylinder", true); break;
+    case text::Obstacle::kSphere:
+      shape.kind = ShapeKind::sphere;
+      round(m.sphere(), "sphere", false);
+      break;
+    case text::Obstacle::kCapsule:
+      shape.kind = ShapeKind::capsule;
+      round(m.capsule(), "capsule", true);
+      break;
+    case text::Obstacle::kCylinder:
+      shape.kind = ShapeKind::cylinder;
+      round(m.cylinder(), "cylinder", true);
+      break;
     case text::Obstacle::kBox: {
       shape.kind = ShapeKind::box;
       const Fields read(m.box(), prefix + "box.", missing);
@@ -148,9 +171,12 @@ geometry::Shape read_shape(const text::Obstacle& m, const std::string& prefix, P
       read("size_m", shape.dims_m);
       break;
     }
-    case text::Obstacle::kHalfSpace: shape.kind = ShapeKind::half_space; break;
+    case text::Obstacle::kHalfSpace:
+      shape.kind = ShapeKind::half_space;
+      break;
     case text::Obstacle::SHAPE_NOT_SET:
-      missing.push_back({prefix + "shape", "is missing, must be one of sphere, capsule, cylinder, box, half_space"});
+      missing.push_back(
+          {prefix + "shape", "is missing, must be one of sphere, capsule, cylinder, box, half_space"});
   }
   return shape;
 }

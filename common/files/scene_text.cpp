@@ -14,7 +14,8 @@ namespace {
 /// A scene file on its way to a scene: the message, where its fields stand, what was wrong so far.
 class Loader {
  public:
-  Loader(const std::string& path, const std::vector<std::string>& overrides) : path_(path), overrides_(overrides) {}
+  Loader(const std::string& path, const std::vector<std::string>& overrides)
+      : path_(path), overrides_(overrides) {}
 
   Checked<scene::Scene> load() {
     const auto text = read_file(path_);
@@ -23,7 +24,8 @@ class Loader {
     found_ = parsed_.problems;
     if (!parsed_.complete) return std::move(found_);
     for (const std::string& o : overrides_)
-      if (const std::string why = apply_override(o, message_); !why.empty()) found_.push_back({"--set " + o, why});
+      if (const std::string why = apply_override(o, message_); !why.empty())
+        found_.push_back({"--set " + o, why});
     SceneParts parts = to_parts(message_);
     note(parts.missing);
     read_stream(parts);
@@ -39,8 +41,10 @@ class Loader {
                                   [&](const std::string& x) { return override_touches(x, p.where); });
       const TextPosition at = find_position(message_, parsed_.positions, p.where);
       const auto& mended = parsed_.mended_lines;
-      if (o != overrides_.rend()) found_.push_back({"--set " + *o, what});
-      else if (at.line == 0) found_.push_back({path_ + ":1:1", what});
+      if (o != overrides_.rend())
+        found_.push_back({"--set " + *o, what});
+      else if (at.line == 0)
+        found_.push_back({path_ + ":1:1", what});
       else if (std::find(mended.begin(), mended.end(), at.line) == mended.end())
         found_.push_back({path_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column), what});
     }
@@ -55,7 +59,8 @@ class Loader {
     scene::Stream& s = *parts.perception.stream;
     s.path = beside(s.path);
     const auto text = read_file(s.path);
-    if (!text) return note({{"perception.stream.path", "= \"" + s.path + "\": " + text.error().front().what}});
+    if (!text)
+      return note({{"perception.stream.path", "= \"" + s.path + "\": " + text.error().front().what}});
     auto samples = scene::parse_stream(text.value(), s.path);
     if (!samples) {
       found_.insert(found_.end(), samples.error().begin(), samples.error().end());
@@ -89,11 +94,20 @@ class Loader {
     }
     const Eigen::VectorXd q0 = start(parts.q0, robot->chain);
     const Eigen::VectorXd qd0 = parts.qd0.value_or(Eigen::VectorXd::Zero(robot->chain.n()));
-    scene::Scene s{parts.name,       text_of(file_text), parts.arm,
-                   std::move(*robot), q0,                 qd0,
-                   parts.goal,       parts.steered,      parts.dynamics,
-                   parts.planner,    std::move(parts.perception), parts.bus,
-                   parts.duration_s, parts.stop};
+    scene::Scene s{parts.name,
+                   text_of(file_text),
+                   parts.arm,
+                   std::move(*robot),
+                   q0,
+                   qd0,
+                   parts.goal,
+                   parts.steered,
+                   parts.dynamics,
+                   parts.planner,
+                   std::move(parts.perception),
+                   parts.bus,
+                   parts.duration_s,
+                   parts.stop};
     if (s.name.empty()) s.name = std::filesystem::path(path_).stem().string();
     Problems broken = scene::problems(s);
     if (s.perception.stream && s.perception.stream->samples.empty())  // already said, with the reason
@@ -111,7 +125,8 @@ class Loader {
   static Eigen::VectorXd start(const std::optional<Eigen::VectorXd>& q0, const model::Chain& chain) {
     if (q0) return *q0;
     Eigen::VectorXd q(chain.n());
-    for (int i = 0; i < chain.n(); ++i) q[i] = std::clamp(0.0, chain.joint(i).limits.lower, chain.joint(i).limits.upper);
+    for (int i = 0; i < chain.n(); ++i)
+      q[i] = std::clamp(0.0, chain.joint(i).limits.lower, chain.joint(i).limits.upper);
     return q;
   }
 

@@ -9,11 +9,13 @@
 
 namespace hamel::files {
 
-/// The scene in a file after overrides such as "planner.method=gyro" or "perception.obstacles[0].position_m=[1,0,0]".
+/// The scene in a file after overrides such as "planner.method=gyro" or
+/// "perception.obstacles[0].position_m=[1,0,0]".
 ///
 /// @param path       of the scene file; the paths in it are relative to its folder
 /// @param overrides  "field.path=value" in text format, in order; strings may be given without quotes
-/// @return a scene that passes scene::problems(), or every problem: `where` is "path:line:column" (from 1, tabs
+/// @return a scene that passes scene::problems(), or every problem: `where` is "path:line:column" (from 1,
+/// tabs
 ///         count to the next multiple of 8) or "--set override"; those of a robot or stream name that file
 /// Reads the robot's URDF and the stream's CSV too.  Never throws for what a file holds.
 Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides = {});

@@ -1,6 +1,7 @@
 #include "common/files/text_fields.h"
 
 #include <google/protobuf/descriptor.h>
+#include <google/protobuf/io/tokenizer.h>
 
 #include <charconv>
 #include <optional>
@@ -32,7 +33,8 @@ std::optional<std::vector<Step>> split_path(std::string_view path) {
     }
     int index = -1;
     const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), index);
-    if (error != std::errc() || stop != word.data() + word.size() || steps.empty() || steps.back().index >= 0) return {};
+    if (error != std::errc() || stop != word.data() + word.size() || steps.empty() || steps.back().index >= 0)
+      return {};
     steps.back().index = index;
   }
   if (steps.empty()) return {};
@@ -78,7 +80,8 @@ std::string quoted(const FieldDescriptor* field, const std::string& value) {
 std::string set_element(Message& parent, const FieldDescriptor* field, int index, const std::string& value) {
   const auto* reflection = parent.GetReflection();
   const int size = reflection->FieldSize(parent, field);
-  if (index > size) return "index " + std::to_string(index) + " is past the end, the list has " + std::to_string(size);
+  if (index > size)
+    return "index " + std::to_string(index) + " is past the end, the list has " + std::to_string(size);
   std::string all;
   for (int i = 0; i < std::max(size, index + 1); ++i) {
     std::string element = value;
@@ -101,19 +104,27 @@ std::string set_field(Message& parent, const FieldDescriptor* field, int index, 
 /// The message one step down, made where it is absent; null and `why` when there is none.
 Message* descend(Message& from, const FieldDescriptor* field, int index, std::string& why) {
   const auto* reflection = from.GetReflection();
-  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) why = field->name() + " has no fields";
-  else if (field->is_repeated() && index < 0) why = field->name() + " is a list, name one: " + field->name() + "[0]";
-  else if (!field->is_repeated() && index >= 0) why = field->name() + " is not a list";
-  else if (!field->is_repeated()) return reflection->MutableMessage(&from, field);
-  else if (index < reflection->FieldSize(from, field)) return reflection->MutableRepeatedMessage(&from, field, index);
-  else if (index == reflection->FieldSize(from, field)) return reflection->AddMessage(&from, field);
-  else why = "index " + std::to_string(index) + " is past the end of " + field->name();
+  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE)
+    why = field->name() + " has no fields";
+  else if (field->is_repeated() && index < 0)
+    why = field->name() + " is a list, name one: " + field->name() + "[0]";
+  else if (!field->is_repeated() && index >= 0)
+    why = field->name() + " is not a list";
+  else if (!field->is_repeated())
+    return reflection->MutableMessage(&from, field);
+  else if (index < reflection->FieldSize(from, field))
+    return reflection->MutableRepeatedMessage(&from, field, index);
+  else if (index == reflection->FieldSize(from, field))
+    return reflection->AddMessage(&from, field);
+  else
+    why = "index " + std::to_string(index) + " is past the end of " + field->name();
   return nullptr;
 }
 
 }  // namespace
 
-TextPosition find_position(const Message& message, const TextFormat::ParseInfoTree& positions, const std::string& path) {
+TextPosition find_position(const Message& message, const TextFormat::ParseInfoTree& positions,
+                           const std::string& path) {
   TextPosition found;
   const auto steps = split_path(path);
   if (!steps) return found;
@@ -145,7 +156,8 @@ std::string apply_override(const std::string& text, Message& message) {
     const Step& step = (*steps)[i];
     const FieldDescriptor* field = at->GetDescriptor()->FindFieldByName(step.name);
     if (field == nullptr)
-      return at->GetDescriptor()->name() + " has no field \"" + step.name + "\"; it has " + names_of(at->GetDescriptor());
+      return at->GetDescriptor()->name() + " has no field \"" + step.name + "\"; it has " +
+             names_of(at->GetDescriptor());
     if (i + 1 == steps->size()) return set_field(*at, field, step.index, text.substr(equals + 1));
     std::string why;
     at = descend(*at, field, step.index, why);

@@ -20,23 +20,27 @@ struct TextPosition {
 /// A text and what its parser learnt about it.
 struct ParsedText {
   google::protobuf::TextFormat::ParseInfoTree positions;
-  Problems problems;               ///< sorted by place; `where` is "name:line:column"
-  std::vector<int> mended_lines;   ///< lines whose value was bad and was read as 0, so that the rest could be read
-  bool complete = true;            ///< false: the text broke off at a problem, fields behind it are missing
+  Problems problems;  ///< sorted by place; `where` is "name:line:column"
+  std::vector<int>
+      mended_lines;      ///< lines whose value was bad and was read as 0, so that the rest could be read
+  bool complete = true;  ///< false: the text broke off at a problem, fields behind it are missing
 };
 
-/// Reads `text` into `message` and lists every unknown field and bad value in it.  A value that cannot be read
-/// stands as 0 in `message`, an unknown field is passed over; other errors end the reading.
-void parse_text(std::string text, const std::string& name, google::protobuf::Message& message, ParsedText& out);
+/// Reads `text` into `message` and lists every unknown field and bad value in it.  A value that cannot be
+/// read stands as 0 in `message`, an unknown field is passed over; other errors end the reading.
+void parse_text(std::string text, const std::string& name, google::protobuf::Message& message,
+                ParsedText& out);
 
 /// Where the field at `path` stands; of the nearest one around it when it does not stand there itself.
 TextPosition find_position(const google::protobuf::Message& message,
-                           const google::protobuf::TextFormat::ParseInfoTree& positions, const std::string& path);
+                           const google::protobuf::TextFormat::ParseInfoTree& positions,
+                           const std::string& path);
 
 /// Does "path=value" to `message`; an empty string, or why not.
 std::string apply_override(const std::string& text, google::protobuf::Message& message);
 
-/// True when a problem at `path` is about the field that the override "field=value" set: one lies within the other.
+/// True when a problem at `path` is about the field that the override "field=value" set: one lies within the
+/// other.
 bool override_touches(const std::string& text, const std::string& path);
 
 }  // namespace hamel::files

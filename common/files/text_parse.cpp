@@ -1,5 +1,6 @@
 /// parse_text(): goes on behind a bad value, so that one reading lists them all.
 #include <google/protobuf/descriptor.h>
+#include <google/protobuf/io/tokenizer.h>
 
 #include <algorithm>
 
@@ -30,7 +31,8 @@ class Notes : public google::protobuf::io::ErrorCollector {
 std::size_t offset_of(const std::string& text, int line, int column) {
   std::size_t i = 0;
   for (; line > 0 && i < text.size(); ++i) line -= text[i] == '\n';
-  for (int at = 0; at < column && i < text.size() && text[i] != '\n'; ++i) at = text[i] == '\t' ? (at / 8 + 1) * 8 : at + 1;
+  for (int at = 0; at < column && i < text.size() && text[i] != '\n'; ++i)
+    at = text[i] == '\t' ? (at / 8 + 1) * 8 : at + 1;
   return i;
 }
 
@@ -70,8 +72,8 @@ std::size_t token_end(const std::string& text, std::size_t begin) {
   return std::min(text.find_first_of(" \t\r\n,:;[]{}<>#", begin), text.size());
 }
 
-/// Writes 0 over the value an error is about.  False when the error is about something else.  `error` then tells
-/// the value's own place and rule.
+/// Writes 0 over the value an error is about.  False when the error is about something else.  `error` then
+/// tells the value's own place and rule.
 bool mend(std::string& text, const google::protobuf::FileDescriptor* file, Note& error) {
   const std::string what = error.what;
   std::size_t begin = offset_of(text, error.line, error.column);
@@ -84,7 +86,9 @@ bool mend(std::string& text, const google::protobuf::FileDescriptor* file, Note&
     if (begin == std::string::npos) return false;
     end = begin + value.size();
     const std::string field = quoted_after(what, "for field ");
-    error = place_of(text, begin, choice.empty() ? what : field + " = " + value + ", must be one of " + choices(file, field));
+    error =
+        place_of(text, begin,
+                 choice.empty() ? what : field + " = " + value + ", must be one of " + choices(file, field));
   } else if (what.find("Expected integer, got") == 0 || what.find("Expected double, got") == 0 ||
              what.find("Integer out of range") == 0) {
     end = token_end(text, begin);
@@ -92,7 +96,9 @@ bool mend(std::string& text, const google::protobuf::FileDescriptor* file, Note&
     return false;
   }
   if (end <= begin) return false;
-  text.replace(begin, end - begin, "0" + std::string(end - begin - 1, ' '));
+  std::fill(text.begin() + static_cast<std::ptrdiff_t>(begin),
+            text.begin() + static_cast<std::ptrdiff_t>(end), ' ');
+  text[begin] = '0';
   return true;
 }
 
@@ -102,17 +108,20 @@ Problem to_problem(const std::string& name, const Note& n) {
 
 /// "Message type "hamel.text.Planner" has no field named "kq"." as a rule with the names that are allowed.
 std::string unknown_field(const google::protobuf::FileDescriptor* file, const std::string& what) {
-  const std::string type = quoted_after(what, "Message type "), field = quoted_after(what, "has no field named ");
+  const std::string type = quoted_after(what, "Message type "),
+                    field = quoted_after(what, "has no field named ");
   const auto* descriptor = file->FindMessageTypeByName(type.substr(type.rfind('.') + 1));
   if (descriptor == nullptr || field.empty()) return what;
   std::string out = "unknown field \"" + field + "\"; " + descriptor->name() + " has ";
-  for (int i = 0; i < descriptor->field_count(); ++i) out += (i == 0 ? "" : ", ") + descriptor->field(i)->name();
+  for (int i = 0; i < descriptor->field_count(); ++i)
+    out += (i == 0 ? "" : ", ") + descriptor->field(i)->name();
   return out;
 }
 
 }  // namespace
 
-void parse_text(std::string text, const std::string& name, google::protobuf::Message& message, ParsedText& out) {
+void parse_text(std::string text, const std::string& name, google::protobuf::Message& message,
+                ParsedText& out) {
   constexpr int kMostRounds = 50;
   const google::protobuf::FileDescriptor* file = message.GetDescriptor()->file();
   std::vector<Note> notes, unknown;

@@ -52,21 +52,25 @@ class Builder {
     warn_of_bare_links();
     auto chain = model::build(spec_);
     if (!chain) return chain.error();
-    return scene::Robot{spec_.name, std::move(text), std::move(chain).value(), std::move(shapes_), std::move(warnings_)};
+    return scene::Robot{spec_.name, std::move(text), std::move(chain).value(), std::move(shapes_),
+                        std::move(warnings_)};
   }
 
  private:
   /// Adds `link`, fixed at X_NL to chain link `carrier`, and all that hangs on it.
   void add(const urdf::Link& link, int carrier, const lie::Pose& X_NL) {
-    if (link.inertial && carrier >= 0) lump(spec_.links[static_cast<std::size_t>(carrier)].inertia, *link.inertial, X_NL);
+    if (link.inertial && carrier >= 0)
+      lump(spec_.links[static_cast<std::size_t>(carrier)].inertia, *link.inertial, X_NL);
     append_shapes(link, carrier, X_NL, sidecar_, shapes_, warnings_);
     frames_[link.name] = X_NL;
     ends_[carrier] += link.child_joints.empty();
     if (link.child_joints.empty()) end_of_[carrier] = link.name;
     const urdf::Joint* moving = nullptr;
     for (const urdf::JointSharedPtr& j : link.child_joints) {
-      if (j->type == urdf::Joint::FIXED) add(*model_.getLink(j->child_link_name), carrier, X_NL * pose_of(*j));
-      else moving = j.get();
+      if (j->type == urdf::Joint::FIXED)
+        add(*model_.getLink(j->child_link_name), carrier, X_NL * pose_of(*j));
+      else
+        moving = j.get();
     }
     if (moving != nullptr) add_joint(*moving, X_NL);
   }
@@ -88,8 +92,10 @@ class Builder {
 
   void set_limits(const urdf::Joint& j, model::JointLimits& out) const {
     const urdf::JointLimits& l = *j.limits;
-    if (const auto a = lint_.acceleration.find(j.name); a != lint_.acceleration.end()) out.acceleration = a->second;
-    const bool none = l.effort == 0 && l.velocity == 0 && (j.type == urdf::Joint::CONTINUOUS || (l.lower == 0 && l.upper == 0));
+    if (const auto a = lint_.acceleration.find(j.name); a != lint_.acceleration.end())
+      out.acceleration = a->second;
+    const bool none = l.effort == 0 && l.velocity == 0 &&
+                      (j.type == urdf::Joint::CONTINUOUS || (l.lower == 0 && l.upper == 0));
     if (none) return;
     out.effort = l.effort;
     out.velocity = l.velocity;
@@ -103,7 +109,8 @@ class Builder {
     const int last = static_cast<int>(spec_.links.size()) - 1;
     const bool one_end = ends_[last] == 1;
     if (tip.empty() && !one_end)
-      warnings_.push_back("end effector: " + spec_.links.back().name + ", because several links are fixed to it (name one)");
+      warnings_.push_back("end effector: " + spec_.links.back().name +
+                          ", because several links are fixed to it (name one)");
     spec_.tip_name = !tip.empty() ? tip : one_end ? end_of_[last] : spec_.links.back().name;
     spec_.X_NE = frames_[spec_.tip_name];
   }
@@ -117,10 +124,14 @@ class Builder {
   }
 
   void warn_of_bare_links() {
-    for (int i = 0; i < static_cast<int>(spec_.links.size()); ++i)
-      if (std::none_of(shapes_.begin(), shapes_.end(), [&](const scene::LinkShape& s) { return s.link == i; }))
-        warnings_.push_back("link " + spec_.links[static_cast<std::size_t>(i)].name +
-                            ": no collision shape, obstacles do not see it");
+    for (int i = 0; i < static_cast<int>(spec_.links.size()); ++i) {
+      const std::string who = "link " + spec_.links[static_cast<std::size_t>(i)].name + ":";
+      const auto mine = [&](const scene::LinkShape& s) { return s.link == i; };
+      const auto said = [&](const std::string& w) { return w.starts_with(who + " collision mesh"); };
+      if (std::none_of(shapes_.begin(), shapes_.end(), mine) &&
+          std::none_of(warnings_.begin(), warnings_.end(), said))
+        warnings_.push_back(who + " no collision shape, the planner does not see it");
+    }
   }
 
   static lie::Pose pose_of(const urdf::Joint& j) { return to_pose(j.parent_to_joint_origin_transform); }
@@ -131,9 +142,9 @@ class Builder {
   model::ChainSpec spec_;
   std::vector<scene::LinkShape> shapes_;
   std::vector<std::string> warnings_;
-  std::map<std::string, lie::Pose> frames_;   // of every link, in its carrier's
-  std::map<int, int> ends_;                   // links without children, by carrier
-  std::map<int, std::string> end_of_;         // one of them
+  std::map<std::string, lie::Pose> frames_;  // of every link, in its carrier's
+  std::map<int, int> ends_;                  // links without children, by carrier
+  std::map<int, std::string> end_of_;        // one of them
 };
 
 /// The sidecar beside a URDF file; empty where there is none.

@@ -18,13 +18,15 @@ namespace {
 using scene::number;
 using tinyxml2::XMLElement;
 
-constexpr double kAxisUnit = 1e-3;    // a written axis may be rounded; it is made unit afterwards
-constexpr double kDefinite = 1e-12;   // smallest over largest principal moment
-constexpr double kTriangle = 1e-9;    // of the largest principal moment, for rounded figures
+constexpr double kAxisUnit = 1e-3;   // a written axis may be rounded; it is made unit afterwards
+constexpr double kDefinite = 1e-12;  // smallest over largest principal moment
+constexpr double kTriangle = 1e-9;   // of the largest principal moment, for rounded figures
 
 std::optional<double> to_number(std::string_view text) {
-  while (!text.empty() && std::string_view(" \t\r\n").find(text.front()) != std::string_view::npos) text.remove_prefix(1);
-  while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos) text.remove_suffix(1);
+  while (!text.empty() && std::string_view(" \t\r\n").find(text.front()) != std::string_view::npos)
+    text.remove_prefix(1);
+  while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos)
+    text.remove_suffix(1);
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   double v = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
@@ -68,7 +70,8 @@ class Part {
   }
 
   /// Three numbers or their default.
-  std::optional<Eigen::Vector3d> triple(const XMLElement& e, const char* name, const Eigen::Vector3d& otherwise) {
+  std::optional<Eigen::Vector3d> triple(const XMLElement& e, const char* name,
+                                        const Eigen::Vector3d& otherwise) {
     if (e.Attribute(name) == nullptr) return otherwise;
     const std::string text = attribute(e, name);
     Eigen::Vector3d v;
@@ -76,7 +79,9 @@ class Part {
     for (std::size_t begin = text.find_first_not_of(" \t\r\n"); begin != std::string::npos; ++count) {
       const std::size_t end = std::min(text.find_first_of(" \t\r\n", begin), text.size());
       const auto x = to_number(std::string_view(text).substr(begin, end - begin));
-      if (!x) return fail(e, std::string(e.Name()) + " " + name + " = \"" + text + "\", must be finite numbers"), std::nullopt;
+      if (!x)
+        return fail(e, std::string(e.Name()) + " " + name + " = \"" + text + "\", must be finite numbers"),
+               std::nullopt;
       if (count < 3) v[count] = *x;
       begin = text.find_first_not_of(" \t\r\n", end);
     }
@@ -96,7 +101,9 @@ class Part {
  protected:
   std::optional<double> read(const XMLElement& e, const char* name) {
     const auto v = to_number(e.Attribute(name));
-    if (!v) fail(e, std::string(e.Name()) + " " + name + " = \"" + e.Attribute(name) + "\", must be a finite number");
+    if (!v)
+      fail(e,
+           std::string(e.Name()) + " " + name + " = \"" + e.Attribute(name) + "\", must be a finite number");
     return v;
   }
 
@@ -130,8 +137,9 @@ class LinkPart : public Part {
     const XMLElement* inertia = inertial.FirstChildElement("inertia");
     if (mass == nullptr) fail(inertial, "inertial has no mass");
     if (inertia == nullptr) fail(inertial, "inertial has no inertia");
-    const auto m = mass == nullptr ? std::nullopt : required(*mass, "value");
-    if (m && *m < 0) fail(*mass, "mass = " + number(*m) + " kg, must be >= 0");
+    const auto mass_kg = mass == nullptr ? std::nullopt : required(*mass, "value");
+    const double m = mass_kg.value_or(0);
+    if (m < 0) fail(*mass, "mass = " + number(m) + " kg, must be >= 0");
     if (inertia == nullptr) return true;
     Eigen::Matrix3d I;
     const char* names[3][3] = {{"ixx", "ixy", "ixz"}, {"ixy", "iyy", "iyz"}, {"ixz", "iyz", "izz"}};
@@ -142,18 +150,20 @@ class LinkPart : public Part {
         read_all = read_all && v;
         I(r, c) = I(c, r) = v.value_or(0);
       }
-    if (m && *m >= 0 && read_all) check_physics(*inertia, *m, I);
-    return !m || !read_all || *m != 0 || !I.isZero(0);
+    if (mass_kg && m >= 0 && read_all) check_physics(*inertia, m, I);
+    return !mass_kg || !read_all || m != 0 || !I.isZero(0);
   }
 
   void check_physics(const XMLElement& at, double mass_kg, const Eigen::Matrix3d& I) {
     if (I.isZero(0)) {
-      if (mass_kg > 0) fail(at, "zero inertia with mass " + number(mass_kg) + " kg, must be positive definite");
+      if (mass_kg > 0)
+        fail(at, "zero inertia with mass " + number(mass_kg) + " kg, must be positive definite");
       return;
     }
-    const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I, Eigen::EigenvaluesOnly).eigenvalues();
-    const std::string principal =
-        "principal moments " + number(moments[0]) + ", " + number(moments[1]) + ", " + number(moments[2]) + " kg m^2";
+    const Eigen::Vector3d moments =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I, Eigen::EigenvaluesOnly).eigenvalues();
+    const std::string principal = "principal moments " + number(moments[0]) + ", " + number(moments[1]) +
+                                  ", " + number(moments[2]) + " kg m^2";
     if (!(moments[0] > kDefinite * moments[2]))
       fail(at, "inertia is not positive definite: " + principal);
     else if (moments[0] + moments[1] < moments[2] * (1 - kTriangle))
@@ -180,7 +190,8 @@ class LinkPart : public Part {
       if (edges && !(edges->array() > 0).all()) fail(*shape, "box has an edge that is not > 0");
     }
     if (kind != "sphere" && kind != "cylinder" && kind != "box" && kind != "mesh")
-      fail(*shape, "collision shape " + std::string(kind) + " is not supported: sphere, box, cylinder or mesh");
+      fail(*shape,
+           "collision shape " + std::string(kind) + " is not supported: sphere, box, cylinder or mesh");
   }
 };
 
@@ -195,7 +206,8 @@ class JointPart : public Part {
     if (type == "fixed") return joint;
     if (type != "revolute" && type != "continuous" && type != "prismatic") {
       fail(element_, type.empty() ? "has no type"
-                                  : "joint type " + type + " is not supported: revolute, continuous, prismatic or fixed");
+                                  : "joint type " + type +
+                                        " is not supported: revolute, continuous, prismatic or fixed");
       return joint;
     }
     if (const XMLElement* mimic = element_.FirstChildElement("mimic"))
@@ -226,7 +238,8 @@ class JointPart : public Part {
   void check_limit(const std::string& type) {
     const XMLElement* limit = element_.FirstChildElement("limit");
     if (limit == nullptr) {
-      if (type != "continuous") fail(element_, "has no limit, a " + type + " joint needs lower, upper, effort and velocity");
+      if (type != "continuous")
+        fail(element_, "has no limit, a " + type + " joint needs lower, upper, effort and velocity");
       return;
     }
     for (const char* key : {"acceleration", "drake:acceleration"})
@@ -246,10 +259,14 @@ class JointPart : public Part {
     const auto lower = optional(limit, "lower", 0), upper = optional(limit, "upper", 0);
     if (!lower || !upper) return;
     const bool absent = limit.Attribute("lower") == nullptr && limit.Attribute("upper") == nullptr;
-    if (*lower > *upper) fail(limit, "limits crossed: lower " + number(*lower) + " > upper " + number(*upper));
-    else if (*lower == 0 && *upper == 0 && others_zero) warn("all limits are 0: taken as none given");
-    else if (absent) fail(limit, "limit has neither lower nor upper, a " + type + " joint needs them");
-    else if (*lower == *upper) warn("lower and upper limit are equal: the joint may not move");
+    if (*lower > *upper)
+      fail(limit, "limits crossed: lower " + number(*lower) + " > upper " + number(*upper));
+    else if (*lower == 0 && *upper == 0 && others_zero)
+      warn("all limits are 0: taken as none given");
+    else if (absent)
+      fail(limit, "limit has neither lower nor upper, a " + type + " joint needs them");
+    else if (*lower == *upper)
+      warn("lower and upper limit are equal: the joint may not move");
   }
 
   void check_dynamics() {
@@ -277,12 +294,15 @@ UrdfLint lint_urdf(const std::string& text, const std::string& name, const std::
     return out;
   }
   UrdfStructure structure;
-  for (const XMLElement* e = robot->FirstChildElement("link"); e != nullptr; e = e->NextSiblingElement("link")) {
+  for (const XMLElement* e = robot->FirstChildElement("link"); e != nullptr;
+       e = e->NextSiblingElement("link")) {
     LinkPart link(*e, name, out);
     const bool heavy = link.check();
-    if (!structure.links.emplace(link.name(), UrdfLink{heavy, e->GetLineNum()}).second) link.fail(*e, "is there twice");
+    if (!structure.links.emplace(link.name(), UrdfLink{heavy, e->GetLineNum()}).second)
+      link.fail(*e, "is there twice");
   }
-  for (const XMLElement* e = robot->FirstChildElement("joint"); e != nullptr; e = e->NextSiblingElement("joint")) {
+  for (const XMLElement* e = robot->FirstChildElement("joint"); e != nullptr;
+       e = e->NextSiblingElement("joint")) {
     JointPart joint(*e, name, out);
     for (const UrdfJoint& other : structure.joints)
       if (other.name == joint.name()) joint.fail(*e, "is there twice");

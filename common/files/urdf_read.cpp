@@ -11,7 +11,9 @@ namespace {
 
 class Capture : public console_bridge::OutputHandler {
  public:
-  explicit Capture(std::vector<std::string>& errors) : errors_(errors) { console_bridge::useOutputHandler(this); }
+  explicit Capture(std::vector<std::string>& errors) : errors_(errors) {
+    console_bridge::useOutputHandler(this);
+  }
   ~Capture() override { console_bridge::restorePreviousOutputHandler(); }
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) errors_.push_back(text);

@@ -2,6 +2,7 @@
 /// liburdfdom, kept quiet.
 
 #include <urdf_model/model.h>
+#include <urdf_world/types.h>
 
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@ namespace hamel::files {
 
 /// What liburdfdom made of a text, and the errors it would have printed.
 struct UrdfModel {
-  urdf::ModelInterfaceSharedPtr model;   ///< null when it refused
+  urdf::ModelInterfaceSharedPtr model;  ///< null when it refused
   std::vector<std::string> errors;
 };
 

@@ -64,7 +64,8 @@ bool to_shape(const urdf::Geometry& g, Shape& out) {
       out = {ShapeKind::box, {d.x, d.y, d.z}};
       return true;
     }
-    case urdf::Geometry::MESH: break;
+    case urdf::Geometry::MESH:
+      break;
   }
   return false;
 }
@@ -86,15 +87,18 @@ Checked<Sidecar> parse_sidecar(const std::string& text, const std::string& name)
     const std::string path = "link[" + std::to_string(i) + "]";
     const auto fail = [&](const std::string& where, const std::string& what) {
       const TextPosition at = find_position(message, parsed.positions, where);
-      parsed.problems.push_back({name + ":" + std::to_string(at.line) + ":" + std::to_string(at.column), where + " " + what});
+      parsed.problems.push_back(
+          {name + ":" + std::to_string(at.line) + ":" + std::to_string(at.column), where + " " + what});
     };
     if (set.name().empty()) fail(path, "has no name");
     for (int k = 0; k < set.spheres_size(); ++k) {
       const text::LinkSphere& s = set.spheres(k);
       const std::string where = path + ".spheres[" + std::to_string(k) + "]";
-      const bool center = s.center_m_size() == 3 && std::isfinite(s.center_m(0) + s.center_m(1) + s.center_m(2));
+      const bool center =
+          s.center_m_size() == 3 && std::isfinite(s.center_m(0) + s.center_m(1) + s.center_m(2));
       if (!center) fail(where, "must have a center_m of three numbers");
-      if (!s.has_radius_m() || !(s.radius_m() >= 0) || !std::isfinite(s.radius_m())) fail(where, "must have a radius_m >= 0");
+      if (!s.has_radius_m() || !(s.radius_m() >= 0) || !std::isfinite(s.radius_m()))
+        fail(where, "must have a radius_m >= 0");
       if (center) out[set.name()].push_back({{s.center_m(0), s.center_m(1), s.center_m(2)}, s.radius_m()});
     }
   }
@@ -117,7 +121,8 @@ void append_shapes(const urdf::Link& link, int carrier, const lie::Pose& X_NL, c
     all.push_back(p);
   }
   if (meshes > 0 && given == sidecar.end())
-    warnings.push_back("link " + link.name + ": collision mesh left out, the planner does not see it (give spheres in a sidecar)");
+    warnings.push_back("link " + link.name +
+                       ": collision mesh left out, the planner does not see it (give spheres in a sidecar)");
   merge_capsules(all);
   if (given != sidecar.end())
     for (const SidecarSphere& s : given->second)

@@ -2,6 +2,7 @@
 /// Collision shapes of URDF links, and the sidecar that gives spheres for meshes.
 
 #include <urdf_model/model.h>
+#include <urdf_world/types.h>
 
 #include <map>
 #include <string>
@@ -23,8 +24,8 @@ using Sidecar = std::map<std::string, std::vector<SidecarSphere>>;
 /// The spheres of a sidecar's text, or every problem as "name:line:column".
 Checked<Sidecar> parse_sidecar(const std::string& text, const std::string& name);
 
-/// Appends the shapes of `link`, whose frame stands at X_NL in the frame of chain link `carrier` (-1: the base).
-/// A mesh with no spheres in the sidecar is left out with a warning.
+/// Appends the shapes of `link`, whose frame stands at X_NL in the frame of chain link `carrier` (-1: the
+/// base). A mesh with no spheres in the sidecar is left out with a warning.
 void append_shapes(const urdf::Link& link, int carrier, const lie::Pose& X_NL, const Sidecar& sidecar,
                    std::vector<scene::LinkShape>& shapes, std::vector<std::string>& warnings);
 

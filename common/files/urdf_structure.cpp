@@ -35,11 +35,13 @@ class Checker {
     std::map<std::string, const UrdfJoint*> parent_of;
     for (const UrdfJoint& j : s_.joints) {
       for (const std::string& link : {j.parent, j.child})
-        if (!link.empty() && s_.links.count(link) == 0) fail(j.line, "joint " + j.name, "link " + link + " does not exist");
+        if (!link.empty() && s_.links.count(link) == 0)
+          fail(j.line, "joint " + j.name, "link " + link + " does not exist");
       const auto [other, first] = parent_of.emplace(j.child, &j);
       if (!first && !j.child.empty())
-        fail(j.line, "link " + j.child, "has two parents (joints " + other->second->name + ", " + j.name +
-                                            "): a loop, not an open chain");
+        fail(j.line, "link " + j.child,
+             "has two parents (joints " + other->second->name + ", " + j.name +
+                 "): a loop, not an open chain");
       if (j.parent.empty() || j.child.empty()) return false;  // said where the joint was read
     }
     if (s_.links.empty()) fail(1, "robot", "has no link");
@@ -53,8 +55,10 @@ class Checker {
     for (const auto& [name, link] : s_.links)
       if (children.count(name) == 0) roots.push_back(name);
     if (roots.size() == 1) return reaches_all(roots.front()) ? roots.front() : "";
-    if (roots.empty()) fail(1, "robot", "has no root link: its joints form a loop");
-    else fail(s_.links.at(roots[1]).line, "robot", "has several root links: " + joined(roots));
+    if (roots.empty())
+      fail(1, "robot", "has no root link: its joints form a loop");
+    else
+      fail(s_.links.at(roots[1]).line, "robot", "has several root links: " + joined(roots));
     return {};
   }
 
@@ -67,7 +71,8 @@ class Checker {
     }
     for (const auto& [name, link] : s_.links)
       if (seen.count(name) == 0) {
-        fail(link.line, "link " + name, "is not connected to the root " + root + ": a loop, not an open chain");
+        fail(link.line, "link " + name,
+             "is not connected to the root " + root + ": a loop, not an open chain");
         return false;
       }
     return true;
@@ -95,8 +100,8 @@ class Checker {
       if (j->moves || moves_behind(j->child)) branches.push_back(j->name);
     if (branches.size() > 1) {
       single_ = false;
-      fail(s_.links.at(link).line, "link " + link, "carries several moving branches (joints " + joined(branches) +
-                                                       "): a tree, not an open chain");
+      fail(s_.links.at(link).line, "link " + link,
+           "carries several moving branches (joints " + joined(branches) + "): a tree, not an open chain");
     }
     for (const bool moving : {false, true})  // what moves comes last, so that last_ ends at the tip
       for (const UrdfJoint* j : children_[link])
@@ -111,9 +116,11 @@ class Checker {
   }
 
   void check_tip(const std::string& tip) {
-    if (s_.links.count(tip) == 0) fail(1, "robot", "end effector " + tip + ": no such link");
+    if (s_.links.count(tip) == 0)
+      fail(1, "robot", "end effector " + tip + ": no such link");
     else if (carrier_of_[tip] != last_)
-      fail(s_.links.at(tip).line, "link " + tip, "cannot be the end effector: must be fixed to the last moving link, " + last_);
+      fail(s_.links.at(tip).line, "link " + tip,
+           "cannot be the end effector: must be fixed to the last moving link, " + last_);
   }
 
   const UrdfStructure& s_;

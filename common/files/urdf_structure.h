@@ -10,7 +10,7 @@
 namespace hamel::files {
 
 struct UrdfLink {
-  bool heavy = false;   ///< has mass or inertia
+  bool heavy = false;  ///< has mass or inertia
   int line = 0;
 };
 
@@ -25,8 +25,8 @@ struct UrdfStructure {
   std::vector<UrdfJoint> joints;
 };
 
-/// Links that do not exist, two parents, several roots or none, several moving branches, no moving joint, a moving
-/// link without inertia, an end effector that is not fixed to the last moving link.
+/// Links that do not exist, two parents, several roots or none, several moving branches, no moving joint, a
+/// moving link without inertia, an end effector that is not fixed to the last moving link.
 Problems check_structure(const UrdfStructure& s, const std::string& file, const std::string& tip);
 
 }  // namespace hamel::files

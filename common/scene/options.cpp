@@ -37,7 +37,8 @@ void check_forces(const PlannerOptions& o, Rules& r) {
   r.positive("flip_time_s", o.flip_time_s);
   r.not_negative("limit_weight", o.limit_weight);
   if (o.barrier_gain > 0)
-    r.must(o.dmin_m < o.rho0_m, "dmin_m", o.dmin_m, "< rho0_m = " + number(o.rho0_m) + " while the barrier is on");
+    r.must(o.dmin_m < o.rho0_m, "dmin_m", o.dmin_m,
+           "< rho0_m = " + number(o.rho0_m) + " while the barrier is on");
 }
 
 void check_states(const PlannerOptions& o, Rules& r) {
@@ -67,81 +68,108 @@ Problems problems(const PlannerOptions& o) {
 
 const char* to_string(Tier v) {
   switch (v) {
-    case Tier::hamel: return "hamel";
-    case Tier::midpoint: return "midpoint";
-    case Tier::gauss: return "gauss";
-    case Tier::semi_implicit_euler: return "semi_implicit_euler";
-    case Tier::rk4: return "rk4";
-    case Tier::dopri8: return "dopri8";
+    case Tier::hamel:
+      return "hamel";
+    case Tier::midpoint:
+      return "midpoint";
+    case Tier::gauss:
+      return "gauss";
+    case Tier::semi_implicit_euler:
+      return "semi_implicit_euler";
+    case Tier::rk4:
+      return "rk4";
+    case Tier::dopri8:
+      return "dopri8";
   }
   return "?";
 }
 
 const char* to_string(Root v) {
   switch (v) {
-    case Root::feedback: return "feedback";
-    case Root::newton: return "newton";
+    case Root::feedback:
+      return "feedback";
+    case Root::newton:
+      return "newton";
   }
   return "?";
 }
 
 const char* to_string(Start v) {
   switch (v) {
-    case Start::extrapolated: return "extrapolated";
-    case Start::previous: return "previous";
+    case Start::extrapolated:
+      return "extrapolated";
+    case Start::previous:
+      return "previous";
   }
   return "?";
 }
 
 const char* to_string(Method v) {
   switch (v) {
-    case Method::attract: return "attract";
-    case Method::khatib: return "khatib";
-    case Method::gyro_paper: return "gyro_paper";
-    case Method::gyro: return "gyro";
+    case Method::attract:
+      return "attract";
+    case Method::khatib:
+      return "khatib";
+    case Method::gyro_paper:
+      return "gyro_paper";
+    case Method::gyro:
+      return "gyro";
   }
   return "?";
 }
 
 const char* to_string(GainForm v) {
   switch (v) {
-    case GainForm::F1: return "F1";
-    case GainForm::F2: return "F2";
-    case GainForm::F3: return "F3";
-    case GainForm::S: return "S";
+    case GainForm::F1:
+      return "F1";
+    case GainForm::F2:
+      return "F2";
+    case GainForm::F3:
+      return "F3";
+    case GainForm::S:
+      return "S";
   }
   return "?";
 }
 
 const char* to_string(Mapping v) {
   switch (v) {
-    case Mapping::paper: return "paper";
-    case Mapping::force: return "force";
-    case Mapping::symmetric: return "symmetric";
+    case Mapping::paper:
+      return "paper";
+    case Mapping::force:
+      return "force";
+    case Mapping::symmetric:
+      return "symmetric";
   }
   return "?";
 }
 
 const char* to_string(PairPolicy v) {
   switch (v) {
-    case PairPolicy::nearest: return "nearest";
-    case PairPolicy::all: return "all";
+    case PairPolicy::nearest:
+      return "nearest";
+    case PairPolicy::all:
+      return "all";
   }
   return "?";
 }
 
 const char* to_string(Pace v) {
   switch (v) {
-    case Pace::lockstep: return "lockstep";
-    case Pace::realtime: return "realtime";
+    case Pace::lockstep:
+      return "lockstep";
+    case Pace::realtime:
+      return "realtime";
   }
   return "?";
 }
 
 const char* to_string(StopRule v) {
   switch (v) {
-    case StopRule::at_duration: return "at_duration";
-    case StopRule::when_reached: return "when_reached";
+    case StopRule::at_duration:
+      return "at_duration";
+    case StopRule::when_reached:
+      return "when_reached";
   }
   return "?";
 }

@@ -26,7 +26,9 @@ class Rules {
   void must(bool ok, const std::string& name, double value, const std::string& rule) {
     if (!ok) fail(name, "= " + number(value) + ", must be " + rule);
   }
-  void positive(const std::string& name, double value) { must(finite(value) && value > 0, name, value, "> 0"); }
+  void positive(const std::string& name, double value) {
+    must(finite(value) && value > 0, name, value, "> 0");
+  }
   void positive_or_inf(const std::string& name, double value) { must(value > 0, name, value, "> 0"); }
   void not_negative(const std::string& name, double value) {
     must(finite(value) && value >= 0, name, value, ">= 0 and finite");
@@ -34,7 +36,9 @@ class Rules {
   void within(const std::string& name, double value, double low, double high) {
     must(value >= low && value <= high, name, value, "in [" + number(low) + ", " + number(high) + "]");
   }
-  void fail(const std::string& name, std::string what) { found_.push_back({prefix_ + name, std::move(what)}); }
+  void fail(const std::string& name, std::string what) {
+    found_.push_back({prefix_ + name, std::move(what)});
+  }
   Problems take() { return std::move(found_); }
 
  private:

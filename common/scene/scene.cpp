@@ -8,9 +8,9 @@
 namespace hamel::scene {
 namespace {
 
-constexpr std::uint32_t kMaxArm = 0x0fffffff;   // a service's instance on the wire is arm * 16 + kind
-constexpr std::size_t kMaxObstacles = 4096;     // of one set on the wire
-constexpr double kUnit = 1e-9;                  // how far a rotation may be from orthonormal
+constexpr std::uint32_t kMaxArm = 0x0fffffff;  // a service's instance on the wire is arm * 16 + kind
+constexpr std::size_t kMaxObstacles = 4096;    // of one set on the wire
+constexpr double kUnit = 1e-9;                 // how far a rotation may be from orthonormal
 
 std::string at(const std::string& name, std::size_t i) { return name + "[" + std::to_string(i) + "]"; }
 
@@ -28,7 +28,9 @@ void check_shape(Rules& r, const std::string& name, const geometry::Shape& shape
   using geometry::ShapeKind;
   const Eigen::Vector3d& d = shape.dims_m;
   switch (shape.kind) {
-    case ShapeKind::sphere: r.not_negative(name + "sphere.radius_m", d[0]); break;
+    case ShapeKind::sphere:
+      r.not_negative(name + "sphere.radius_m", d[0]);
+      break;
     case ShapeKind::capsule:
       r.not_negative(name + "capsule.radius_m", d[0]);
       r.not_negative(name + "capsule.length_m", d[1]);
@@ -40,14 +42,15 @@ void check_shape(Rules& r, const std::string& name, const geometry::Shape& shape
     case ShapeKind::box:
       if (!d.allFinite() || !(d.array() > 0).all()) r.fail(name + "box.size_m", "must have three edges > 0");
       break;
-    case ShapeKind::half_space: break;
+    case ShapeKind::half_space:
+      break;
   }
 }
 
 void check_joint_vector(Rules& r, const std::string& name, const Eigen::VectorXd& v, int n) {
   if (v.size() != n)
-    r.fail(name, "has " + std::to_string(v.size()) + " values, must have one for each of the " + std::to_string(n) +
-                     " joints");
+    r.fail(name, "has " + std::to_string(v.size()) + " values, must have one for each of the " +
+                     std::to_string(n) + " joints");
   for (Eigen::Index i = 0; i < v.size(); ++i)
     if (!std::isfinite(v[i])) r.fail(at(name, static_cast<std::size_t>(i)), "is not finite");
 }
@@ -66,7 +69,8 @@ void check_robot(Rules& r, const Robot& robot) {
   for (std::size_t i = 0; i < robot.shapes.size(); ++i) {
     const LinkShape& s = robot.shapes[i];
     const std::string name = at("robot.shapes", i) + ".";
-    if (s.link < -1 || s.link >= robot.chain.n()) r.fail(name + "link", "= " + std::to_string(s.link) + ", no such link");
+    if (s.link < -1 || s.link >= robot.chain.n())
+      r.fail(name + "link", "= " + std::to_string(s.link) + ", no such link");
     check_shape(r, name, s.shape);
     check_pose(r, name, s.X_LS);
   }
@@ -95,8 +99,10 @@ void check_obstacle(Rules& r, const std::string& name, const ScriptedObstacle& o
   r.not_negative(name + "sinusoid.frequency_hz", o.frequency_hz);
   if (!std::isfinite(o.phase_rad)) r.fail(name + "sinusoid.phase_rad", "is not finite");
   const bool swings = !o.amplitude_m.isZero(0);
-  if (swings && !o.velocity_mps.isZero(0)) r.fail(name + "sinusoid", "stands beside velocity_mps, must be one motion");
-  if (swings && o.frequency_hz == 0) r.fail(name + "sinusoid.frequency_hz", "= 0, must be > 0 where amplitude_m is not zero");
+  if (swings && !o.velocity_mps.isZero(0))
+    r.fail(name + "sinusoid", "stands beside velocity_mps, must be one motion");
+  if (swings && o.frequency_hz == 0)
+    r.fail(name + "sinusoid.frequency_hz", "= 0, must be > 0 where amplitude_m is not zero");
 }
 
 void check_stream(Rules& r, const PerceptionOptions& o) {
@@ -112,7 +118,8 @@ void check_stream(Rules& r, const PerceptionOptions& o) {
     r.fail("stream.path", "has " + std::to_string(ids.size()) + " ids, one set holds at most 4096 obstacles");
   for (std::size_t i = 0; i < o.obstacles.size(); ++i)
     if (ids.count(o.obstacles[i].at_start.id) != 0)
-      r.fail(at("obstacles", i) + ".id", "= " + std::to_string(o.obstacles[i].at_start.id) + " is also an id of the stream");
+      r.fail(at("obstacles", i) + ".id",
+             "= " + std::to_string(o.obstacles[i].at_start.id) + " is also an id of the stream");
 }
 
 /// True where all joints turn about parallel axes.
@@ -139,7 +146,8 @@ void check_bus(Rules& r, const std::string& service, const std::string& bus) {
 double top_speed_mps(const PerceptionOptions& o) {
   double top = 0;
   for (const ScriptedObstacle& x : o.obstacles)
-    top = std::max({top, x.velocity_mps.norm(), 2 * std::numbers::pi * x.frequency_hz * x.amplitude_m.norm()});
+    top =
+        std::max({top, x.velocity_mps.norm(), 2 * std::numbers::pi * x.frequency_hz * x.amplitude_m.norm()});
   return top;
 }
 
@@ -154,7 +162,8 @@ Problems problems(const PerceptionOptions& o) {
   for (std::size_t i = 0; i < o.obstacles.size(); ++i) {
     check_obstacle(r, at("obstacles", i) + ".", o.obstacles[i]);
     const std::uint32_t id = o.obstacles[i].at_start.id;
-    if (!ids.insert(id).second) r.fail(at("obstacles", i) + ".id", "= " + std::to_string(id) + " is used twice");
+    if (!ids.insert(id).second)
+      r.fail(at("obstacles", i) + ".id", "= " + std::to_string(id) + " is used twice");
   }
   if (o.stream) check_stream(r, o);
   return r.take();
@@ -170,7 +179,8 @@ Problems problems(const Scene& s) {
   check_joint_vector(r, "qd0", s.qd0, n);
   check_goal(r, s);
   r.positive("duration_s", s.duration_s);
-  if (s.planner.kc == 1 && is_planar(s.robot.chain)) r.fail("planner.kc", "= 1, must be 0 or > 1 on a planar arm");
+  if (s.planner.kc == 1 && is_planar(s.robot.chain))
+    r.fail("planner.kc", "= 1, must be 0 or > 1 on a planar arm");
   check_bus(r, "dynamics", s.bus.dynamics);
   check_bus(r, "planner", s.bus.planner);
   check_bus(r, "perception", s.bus.perception);
@@ -187,7 +197,8 @@ std::vector<std::string> warnings(const Scene& s) {
   const double closing = o.vmax_mps + top_speed_mps(s.perception);  // the barrier needs g rho0 >= it
   if (s.steered && o.barrier_gain > 0 && o.barrier_gain * o.rho0_m < closing)
     out.push_back("planner.barrier_gain * rho0_m = " + number(o.barrier_gain * o.rho0_m) +
-                  " m/s is below the largest closing speed " + number(closing) + " m/s: the barrier may come too late");
+                  " m/s is below the largest closing speed " + number(closing) +
+                  " m/s: the barrier may come too late");
   if (s.steered && !s.goal) out.push_back("no goal: the planner stays IDLE until one is sent");
   if (s.steered && o.period_steps * s.dynamics.dt_s > 0.02)
     out.push_back("a command every " + number(o.period_steps * s.dynamics.dt_s) + " s is slow for avoidance");
@@ -196,9 +207,12 @@ std::vector<std::string> warnings(const Scene& s) {
 
 const char* to_string(GoalKind v) {
   switch (v) {
-    case GoalKind::position: return "position";
-    case GoalKind::pose: return "pose";
-    case GoalKind::joints: return "joints";
+    case GoalKind::position:
+      return "position";
+    case GoalKind::pose:
+      return "pose";
+    case GoalKind::joints:
+      return "joints";
   }
   return "?";
 }
