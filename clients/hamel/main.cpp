@@ -1,6 +1,7 @@
 /// hamel: the command line.
 
 #include "clients/hamel/commands.h"
+#include "clients/hamel/plot.h"
 #include "common/runtime/signals.h"
 
 using namespace hamel;
@@ -55,7 +56,15 @@ int main(int argc, char** argv) {
   status->add_flag("--json", status_args.json, "one JSON object on stdout");
   runtime::add_bus_options(*status, status_args.bus);
 
+  client::PlotArgs plot_args;
+  auto* plot = app.add_subcommand("plot", "draw a run from the file that --csv wrote (needs gnuplot)");
+  plot->add_option("scene", plot_args.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
+  plot->add_option("csv", plot_args.csv_path, "written by --csv of that scene")->required()->type_name("CSV");
+  plot->add_option("-o,--output", plot_args.out_path, "picture, .svg or .png")->required()->type_name("FILE");
+  plot->add_option("--set", plot_args.overrides, "overrides the run was made with")->type_name("PATH=VALUE")->allow_extra_args(false);
+
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
+  if (plot->parsed()) return client::plot(plot_args);
   if (run->parsed()) return client::run(run_args);
   if (up->parsed()) return client::up(up_args);
   if (goal->parsed()) return client::goal(goal_args);
