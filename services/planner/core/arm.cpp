@@ -11,16 +11,18 @@ model::Chain weightless(const model::Chain& chain) {
   model::ChainSpec spec = chain.spec();
   spec.gravity_W_mps2.setZero();
   auto built = model::build(std::move(spec));
-  return std::move(built).value();   // a checked chain stays valid without gravity
+  return std::move(built).value();  // a checked chain stays valid without gravity
 }
 
-// Largest distance between first joint and end effector: all offsets stretched out, prismatic joints at full length.
+// Largest distance between first joint and end effector: all offsets stretched out, prismatic joints at full
+// length.
 double reach(const model::Chain& chain) {
   double sum = chain.X_NE().p.norm();
   for (int i = 0; i < chain.n(); ++i) {
     if (i > 0) sum += chain.joint(i).X_PJ.p.norm();
     const auto& limits = chain.joint(i).limits;
-    if (chain.joint(i).kind == model::JointKind::prismatic) sum += std::max(std::abs(limits.lower), std::abs(limits.upper));
+    if (chain.joint(i).kind == model::JointKind::prismatic)
+      sum += std::max(std::abs(limits.lower), std::abs(limits.upper));
   }
   return sum;
 }
@@ -43,7 +45,7 @@ Arm::Arm(const model::Chain& with_gravity)
 void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept {
   q = q_now;
   qd.setZero();
-  rbd::inverse_dynamics(chain, q, qd_now, qd, ws, coriolis);   // qd serves as the zero acceleration
+  rbd::inverse_dynamics(chain, q, qd_now, qd, ws, coriolis);  // qd serves as the zero acceleration
   qd = qd_now;
   rbd::velocities(chain, q, qd, ws);
   rbd::mass_matrix(chain, ws, M);

@@ -9,7 +9,8 @@
 
 namespace hamel::planner {
 
-/// Everything about the arm that one cycle needs, at one (q, qd).  Gravity is left out: another compensates it.
+/// Everything about the arm that one cycle needs, at one (q, qd).  Gravity is left out: another compensates
+/// it.
 struct Arm {
   explicit Arm(const model::Chain& chain);
   /// No allocation.
@@ -18,17 +19,17 @@ struct Arm {
   /// Angular velocity of a link, world axes.
   Eigen::Vector3d angular_velocity(int link) const noexcept;
 
-  model::Chain chain;              ///< without gravity
+  model::Chain chain;  ///< without gravity
   rbd::Workspace ws;
   Eigen::VectorXd q, qd;
   Eigen::MatrixXd M, M_inverse;
   Eigen::LLT<Eigen::MatrixXd> M_llt;
-  Eigen::VectorXd coriolis;        ///< c(q, qd)
+  Eigen::VectorXd coriolis;  ///< c(q, qd)
   lie::Pose X_WE;
-  Eigen::MatrixXd J_E;             ///< 6 x n at the end effector: (omega, v), world axes
+  Eigen::MatrixXd J_E;  ///< 6 x n at the end effector: (omega, v), world axes
   lie::Twist V_WE = lie::Twist::Zero();
-  double reach_m = 0;              ///< no configuration puts the end effector farther from the first joint
-  Eigen::Vector3d shoulder_W = Eigen::Vector3d::Zero();   ///< where the first joint is
+  double reach_m = 0;  ///< no configuration puts the end effector farther from the first joint
+  Eigen::Vector3d shoulder_W = Eigen::Vector3d::Zero();  ///< where the first joint is
 };
 
 }  // namespace hamel::planner

@@ -14,7 +14,9 @@ double smooth_step(double u) noexcept {
   return c * c * (3 - 2 * c);
 }
 
-double approach_angle(const Vector3d& n, const Vector3d& v) noexcept { return std::atan2(n.cross(v).norm(), n.dot(v)); }
+double approach_angle(const Vector3d& n, const Vector3d& v) noexcept {
+  return std::atan2(n.cross(v).norm(), n.dot(v));
+}
 
 Vector3d khatib_force(const scene::PlannerOptions& o, const Vector3d& n, double d) noexcept {
   if (d > o.rho0_m) return Vector3d::Zero();
@@ -22,7 +24,8 @@ Vector3d khatib_force(const scene::PlannerOptions& o, const Vector3d& n, double 
   return -n * o.eta * std::max(1 / near - 1 / o.rho0_m, 0.0) / (near * near);
 }
 
-double gyro_gain(const scene::PlannerOptions& o, GainForm form, const Vector3d& n, double d, const Vector3d& v) noexcept {
+double gyro_gain(const scene::PlannerOptions& o, GainForm form, const Vector3d& n, double d,
+                 const Vector3d& v) noexcept {
   const double closing = n.dot(v), speed = v.norm();
   if (d > o.rho0_m || closing <= 0 || speed < kSlowest_mps) return 0;
   const double near = std::max(d, kNearest_m);
@@ -36,7 +39,8 @@ double gyro_gain(const scene::PlannerOptions& o, GainForm form, const Vector3d& 
   return o.kobs * G / near / (1 + std::exp(d - o.rho0_m));
 }
 
-Vector3d paper_rotation(const scene::PlannerOptions& o, const Vector3d& n, double d, const Vector3d& v) noexcept {
+Vector3d paper_rotation(const scene::PlannerOptions& o, const Vector3d& n, double d,
+                        const Vector3d& v) noexcept {
   const Vector3d across = n.cross(v);
   const double length = across.norm();
   if (!(length > 0)) return Vector3d::Zero();

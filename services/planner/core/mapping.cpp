@@ -21,7 +21,8 @@ Vector3d joint_rotation(scene::Mapping mapping, const Matrix3d& Lam, const Vecto
   return 0.5 * (Lam.trace() * w - Lam * w);
 }
 
-void add_gyroscopic(const Vector3d& w, const Eigen::Ref<const Eigen::MatrixXd>& J, Eigen::MatrixXd& G) noexcept {
+void add_gyroscopic(const Vector3d& w, const Eigen::Ref<const Eigen::MatrixXd>& J,
+                    Eigen::MatrixXd& G) noexcept {
   // Entry (i, j) is J_i . (w x J_j) = w . (J_j x J_i).
   for (Eigen::Index j = 0; j < J.cols(); ++j) {
     const Vector3d J_j = J.col(j);
