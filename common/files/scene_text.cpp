@@ -40,12 +40,12 @@ class Loader {
       const auto o = std::find_if(overrides_.rbegin(), overrides_.rend(),
                                   [&](const std::string& x) { return override_touches(x, p.where); });
       const TextPosition at = find_position(message_, parsed_.positions, p.where);
-      const auto& mended = parsed_.mended_lines;
+      const auto is_at = [&](const TextPosition& m) { return m.line == at.line && m.column == at.column; };
       if (o != overrides_.rend())
         found_.push_back({"--set " + *o, what});
       else if (at.line == 0)
         found_.push_back({path_ + ":1:1", what});
-      else if (std::find(mended.begin(), mended.end(), at.line) == mended.end())
+      else if (std::none_of(parsed_.mended.begin(), parsed_.mended.end(), is_at))
         found_.push_back({path_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column), what});
     }
   }
@@ -83,15 +83,12 @@ class Loader {
     return {};
   }
 
-  /// Puts the robot to the rest and checks the rules; without a robot those that need none.
+  /// Puts the robot to the rest and checks the rules.  Without a robot a stand-in takes its place, so that
+  /// the rules that do not ask for its joints are still checked.
   Checked<scene::Scene> assemble(SceneParts parts, const std::string& file_text) {
     std::optional<scene::Robot> robot = read_robot(parts);
-    if (!robot) {
-      note(scene::problems(parts.dynamics));
-      note(scene::problems(parts.planner));
-      if (stream_was_read(parts)) note(scene::problems(parts.perception));
-      return std::move(found_);
-    }
+    const bool real = robot.has_value();
+    if (!real) robot = stand_in();
     const Eigen::VectorXd q0 = start(parts.q0, robot->chain);
     const Eigen::VectorXd qd0 = parts.qd0.value_or(Eigen::VectorXd::Zero(robot->chain.n()));
     scene::Scene s{parts.name,
@@ -110,15 +107,25 @@ class Loader {
                    parts.stop};
     if (s.name.empty()) s.name = std::filesystem::path(path_).stem().string();
     Problems broken = scene::problems(s);
-    if (s.perception.stream && s.perception.stream->samples.empty())  // already said, with the reason
-      std::erase_if(broken, [](const Problem& p) { return p.where == "perception.stream.path"; });
+    std::erase_if(broken, [&](const Problem& p) { return is_said(p.where, s, real); });
     note(broken);
     if (!found_.empty()) return std::move(found_);
     return s;
   }
 
-  static bool stream_was_read(const SceneParts& parts) {
-    return !parts.perception.stream || !parts.perception.stream->samples.empty();
+  /// True for a consequence of a problem that was already noted.
+  static bool is_said(const std::string& path, const scene::Scene& s, bool real_robot) {
+    if (path == "perception.stream.path") return s.perception.stream->samples.empty();
+    const bool of_joints = path.starts_with("q0") || path.starts_with("qd0") ||
+                           path.starts_with("goal.joints") || path == "planner.kc";
+    return of_joints && !real_robot;
+  }
+
+  static scene::Robot stand_in() {
+    model::ChainSpec spec;
+    spec.joints.resize(1);
+    spec.links.push_back({"link", {1, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()}});
+    return scene::Robot{"", "", model::build(spec).value(), {}, {}};
   }
 
   /// Zero, or the limit nearest to it.

@@ -1,6 +1,5 @@
 #include "common/files/text_fields.h"
 
-#include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
 
 #include <charconv>
@@ -41,12 +40,6 @@ std::optional<std::vector<Step>> split_path(std::string_view path) {
   return steps;
 }
 
-std::string names_of(const google::protobuf::Descriptor* type) {
-  std::string out;
-  for (int i = 0; i < type->field_count(); ++i) out += (i == 0 ? "" : ", ") + type->field(i)->name();
-  return out;
-}
-
 /// Keeps the first error of a reading.
 class FirstError : public google::protobuf::io::ErrorCollector {
  public:
@@ -61,7 +54,7 @@ std::string merge(const std::string& text, Message& message) {
   TextFormat::Parser parser;
   parser.RecordErrorsTo(&error);
   if (parser.MergeFromString(text, &message)) return {};
-  return error.text.empty() ? "cannot be read" : error.text;
+  return error.text.empty() ? "cannot be read" : explain(message.GetDescriptor()->file(), error.text);
 }
 
 /// A string value may stand without quotes.
@@ -156,8 +149,8 @@ std::string apply_override(const std::string& text, Message& message) {
     const Step& step = (*steps)[i];
     const FieldDescriptor* field = at->GetDescriptor()->FindFieldByName(step.name);
     if (field == nullptr)
-      return at->GetDescriptor()->name() + " has no field \"" + step.name + "\"; it has " +
-             names_of(at->GetDescriptor());
+      return explain(message.GetDescriptor()->file(), "Message type \"" + at->GetDescriptor()->full_name() +
+                                                          "\" has no field named \"" + step.name + "\".");
     if (i + 1 == steps->size()) return set_field(*at, field, step.index, text.substr(equals + 1));
     std::string why;
     at = descend(*at, field, step.index, why);

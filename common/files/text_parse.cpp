@@ -1,5 +1,4 @@
 /// parse_text(): goes on behind a bad value, so that one reading lists them all.
-#include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
 
 #include <algorithm>
@@ -72,30 +71,41 @@ std::size_t token_end(const std::string& text, std::size_t begin) {
   return std::min(text.find_first_of(" \t\r\n,:;[]{}<>#", begin), text.size());
 }
 
-/// Writes 0 over the value an error is about.  False when the error is about something else.  `error` then
-/// tells the value's own place and rule.
-bool mend(std::string& text, const google::protobuf::FileDescriptor* file, Note& error) {
-  const std::string what = error.what;
-  std::size_t begin = offset_of(text, error.line, error.column);
-  std::size_t end = 0;
-  const std::string choice = quoted_after(what, "Unknown enumeration value of ");
-  const std::string truth = quoted_after(what, "Value: ");
-  if (!choice.empty() || !truth.empty()) {  // these are reported behind the value
-    const std::string value = choice.empty() ? truth : choice;
-    begin = begin == 0 ? std::string::npos : text.rfind(value, begin - 1);
-    if (begin == std::string::npos) return false;
-    end = begin + value.size();
-    const std::string field = quoted_after(what, "for field ");
-    error =
-        place_of(text, begin,
-                 choice.empty() ? what : field + " = " + value + ", must be one of " + choices(file, field));
-  } else if (what.find("Expected integer, got") == 0 || what.find("Expected double, got") == 0 ||
-             what.find("Integer out of range") == 0) {
-    end = token_end(text, begin);
-  } else {
-    return false;
-  }
+/// Moves a note that the parser put behind a word to the word itself.
+bool move_back_to(const std::string& word, const std::string& text, Note& note) {
+  const std::size_t behind = offset_of(text, note.line, note.column);
+  const std::size_t at = behind == 0 ? std::string::npos : text.rfind(word, behind - 1);
+  if (at == std::string::npos) return false;
+  note = place_of(text, at, note.what);
+  return true;
+}
+
+/// The field whose value, or list of values, holds the byte `value`.
+TextPosition field_of(const std::string& text, std::size_t value) {
+  const std::size_t colon = text.rfind(':', value);
+  const std::size_t last = colon == std::string::npos ? colon : text.find_last_not_of(" \t\r\n", colon - 1);
+  if (last == std::string::npos) return {};
+  const std::size_t before = text.find_last_of(" \t\r\n{},;]>", last);
+  const Note n = place_of(text, before == std::string::npos ? 0 : before + 1, "");
+  return {n.line + 1, n.column + 1};
+}
+
+/// Writes 0 over the value an error is about and moves the error there.  False when it is about something
+/// else.
+bool mend(std::string& text, const google::protobuf::FileDescriptor* file, Note& error, ParsedText& out) {
+  const std::string choice = quoted_after(error.what, "Unknown enumeration value of ");
+  const std::string truth = quoted_after(error.what, "Value: ");
+  const std::string word = choice.empty() ? truth : choice;
+  const auto begins = [&](const char* with) { return error.what.starts_with(with); };
+  const bool of_number =
+      begins("Expected integer, got") || begins("Expected double, got") || begins("Integer out of range");
+  if (word.empty() && !of_number) return false;
+  if (!word.empty() && !move_back_to(word, text, error)) return false;
+  error.what = explain(file, error.what);
+  const std::size_t begin = offset_of(text, error.line, error.column);
+  const std::size_t end = word.empty() ? token_end(text, begin) : begin + word.size();
   if (end <= begin) return false;
+  out.mended.push_back(field_of(text, begin));
   std::fill(text.begin() + static_cast<std::ptrdiff_t>(begin),
             text.begin() + static_cast<std::ptrdiff_t>(end), ' ');
   text[begin] = '0';
@@ -106,19 +116,23 @@ Problem to_problem(const std::string& name, const Note& n) {
   return {name + ":" + std::to_string(n.line + 1) + ":" + std::to_string(n.column + 1), n.what};
 }
 
-/// "Message type "hamel.text.Planner" has no field named "kq"." as a rule with the names that are allowed.
-std::string unknown_field(const google::protobuf::FileDescriptor* file, const std::string& what) {
+}  // namespace
+
+std::string explain(const google::protobuf::FileDescriptor* schema, const std::string& what) {
   const std::string type = quoted_after(what, "Message type "),
                     field = quoted_after(what, "has no field named ");
-  const auto* descriptor = file->FindMessageTypeByName(type.substr(type.rfind('.') + 1));
+  const std::string choice = quoted_after(what, "Unknown enumeration value of ");
+  if (!choice.empty()) {
+    const std::string chosen = quoted_after(what, "for field ");
+    return chosen + " = " + choice + ", must be one of " + choices(schema, chosen);
+  }
+  const auto* descriptor = schema->FindMessageTypeByName(type.substr(type.rfind('.') + 1));
   if (descriptor == nullptr || field.empty()) return what;
   std::string out = "unknown field \"" + field + "\"; " + descriptor->name() + " has ";
   for (int i = 0; i < descriptor->field_count(); ++i)
     out += (i == 0 ? "" : ", ") + descriptor->field(i)->name();
   return out;
 }
-
-}  // namespace
 
 void parse_text(std::string text, const std::string& name, google::protobuf::Message& message,
                 ParsedText& out) {
@@ -135,10 +149,9 @@ void parse_text(std::string text, const std::string& name, google::protobuf::Mes
     unknown = heard.warnings;
     if (out.complete || heard.errors.empty()) break;
     Note error = heard.errors.front();
-    const bool mended = mend(text, file, error);
+    const bool mended = mend(text, file, error, out);
     notes.push_back(error);
     if (!mended) break;
-    out.mended_lines.push_back(error.line + 1);
   }
   Notes ignored;  // the reading that counts: same text, now with places
   google::protobuf::TextFormat::Parser parser;
@@ -146,7 +159,10 @@ void parse_text(std::string text, const std::string& name, google::protobuf::Mes
   parser.AllowUnknownField(true);
   parser.WriteLocationsTo(&out.positions);
   (void)parser.ParseFromString(text, &message);
-  for (Note& n : unknown) n.what = unknown_field(file, n.what);
+  for (Note& n : unknown) {
+    move_back_to(quoted_after(n.what, "has no field named "), text, n);
+    n.what = explain(file, n.what);
+  }
   notes.insert(notes.end(), unknown.begin(), unknown.end());
   std::stable_sort(notes.begin(), notes.end(), [](const Note& a, const Note& b) {
     return a.line != b.line ? a.line < b.line : a.column < b.column;

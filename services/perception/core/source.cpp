@@ -1,0 +1,152 @@
+#include "services/perception/core/source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace hamel::perception {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kOnGrid = 1e-6;  // of a period: so near a grid point counts as on it
+
+bool moves(const scene::ScriptedObstacle& o) { return !o.velocity_mps.isZero(0) || !o.amplitude_m.isZero(0); }
+
+geometry::Obstacle scripted_at(const scene::ScriptedObstacle& o, double t_s) {
+  geometry::Obstacle out = o.at_start;
+  const double omega = 2 * std::numbers::pi * o.frequency_hz;
+  const double angle = omega * t_s + o.phase_rad;
+  out.X_WO.p += o.velocity_mps * t_s + o.amplitude_m * std::sin(angle);
+  out.V_WO.head<3>().setZero();
+  out.V_WO.tail<3>() = o.velocity_mps + o.amplitude_m * (omega * std::cos(angle));
+  out.velocity_known = true;
+  return out;
+}
+
+}  // namespace
+
+Checked<Source> Source::make(const scene::PerceptionOptions& options) {
+  Problems found = scene::problems(options);
+  if (!found.empty()) return found;
+  return Source(options);
+}
+
+Source::Source(const scene::PerceptionOptions& options)
+    : scripted_(options.obstacles), rate_hz_(options.rate_hz) {
+  moves_ = std::any_of(scripted_.begin(), scripted_.end(), moves);
+  if (options.stream) {
+    stream_ = *options.stream;
+    rate_hz_ = std::max(rate_hz_, kLeastStreamRate_hz);
+    make_frames();
+  }
+  most_ += scripted_.size();
+}
+
+void Source::make_frames() {
+  auto& samples = stream_.samples;
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const auto& a, const auto& b) { return a.t_s != b.t_s ? a.t_s < b.t_s : a.id < b.id; });
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (frames_.empty() || samples[i].t_s > frames_.back().t_s) frames_.push_back({samples[i].t_s, i, i});
+    frames_.back().end = i + 1;
+    most_ = std::max(most_, frames_.back().end - frames_.back().begin);
+  }
+  const std::size_t last = frames_.size() - 1;
+  const bool steady = last > 0 && !is_gap(last - 1);
+  const double interval_s = steady ? frames_[last].t_s - frames_[last - 1].t_s : stream_.rate / rate_hz_;
+  end_s_ = frames_[last].t_s + interval_s;
+}
+
+double Source::stream_time(double t_s) const {
+  const double s = stream_.start_s + stream_.rate * t_s;
+  const double first = frames_.front().t_s;
+  if (!stream_.loop || s < end_s_) return s;
+  return first + std::fmod(s - first, end_s_ - first);
+}
+
+/// The last frame that is not behind; there is one.
+std::size_t Source::frame_at(double stream_t_s) const {
+  const auto after = std::upper_bound(frames_.begin(), frames_.end(), stream_t_s,
+                                      [](double t, const Frame& f) { return t < f.t_s; });
+  return static_cast<std::size_t>(after - frames_.begin()) - 1;
+}
+
+bool Source::is_gap(std::size_t frame) const {
+  return frame + 1 < frames_.size() &&
+         frames_[frame + 1].t_s - frames_[frame].t_s > kLongestSilence_s * stream_.rate;
+}
+
+bool Source::in_gap(double stream_t_s, double& gap_end_s) const {
+  if (frames_.empty() || stream_t_s < frames_.front().t_s) return false;
+  const std::size_t k = frame_at(stream_t_s);
+  if (!is_gap(k) || stream_t_s == frames_[k].t_s) return false;
+  gap_end_s = frames_[k + 1].t_s;
+  return true;
+}
+
+const scene::StreamSample* Source::find(std::size_t frame, std::uint32_t id) const {
+  const auto begin = stream_.samples.begin() + static_cast<std::ptrdiff_t>(frames_[frame].begin);
+  const auto end = stream_.samples.begin() + static_cast<std::ptrdiff_t>(frames_[frame].end);
+  const auto at =
+      std::lower_bound(begin, end, id, [](const auto& s, std::uint32_t wanted) { return s.id < wanted; });
+  return at != end && at->id == id ? &*at : nullptr;
+}
+
+/// One obstacle of the stream: on the line to its next place, else on the line from its last one, else
+/// standing.
+geometry::Obstacle Source::place(std::size_t frame, const scene::StreamSample& sample,
+                                 double stream_t_s) const {
+  geometry::Obstacle out;
+  out.id = sample.id;
+  out.shape.kind = geometry::ShapeKind::sphere;
+  double radius_m = sample.radius_m;
+  Eigen::Vector3d v_S = Eigen::Vector3d::Zero();  // stream lengths per stream second
+  out.velocity_known = true;
+  const double since_s = stream_t_s - frames_[frame].t_s;
+  if (const auto* next =
+          frame + 1 < frames_.size() && !is_gap(frame) ? find(frame + 1, sample.id) : nullptr) {
+    const double span_s = frames_[frame + 1].t_s - frames_[frame].t_s;
+    v_S = (next->p_m - sample.p_m) / span_s;
+    radius_m += (next->radius_m - sample.radius_m) * (since_s / span_s);
+  } else if (const auto* last = frame > 0 && !is_gap(frame - 1) ? find(frame - 1, sample.id) : nullptr) {
+    v_S = (sample.p_m - last->p_m) / (frames_[frame].t_s - frames_[frame - 1].t_s);
+  } else {
+    out.velocity_known = false;
+  }
+  out.shape.dims_m[0] = radius_m * stream_.scale;
+  out.X_WO.p = stream_.X_WS * Eigen::Vector3d(stream_.scale * (sample.p_m + v_S * since_s));
+  out.V_WO.tail<3>() = stream_.X_WS.R * v_S * (stream_.scale * stream_.rate);
+  return out;
+}
+
+bool Source::at(double t_s, std::vector<geometry::Obstacle>& out) const {
+  out.clear();
+  double gap_end_s = 0;
+  const double s = frames_.empty() ? 0 : stream_time(t_s);
+  if (in_gap(s, gap_end_s)) return false;
+  for (const scene::ScriptedObstacle& o : scripted_) out.push_back(scripted_at(o, t_s));
+  if (frames_.empty() || s < frames_.front().t_s || s >= end_s_) return true;
+  const std::size_t k = frame_at(s);
+  for (std::size_t i = frames_[k].begin; i < frames_[k].end; ++i)
+    out.push_back(place(k, stream_.samples[i], s));
+  return true;
+}
+
+/// The first grid point behind t_s.
+double Source::grid_after(double t_s) const { return (std::floor(t_s * rate_hz_ + kOnGrid) + 1) / rate_hz_; }
+
+double Source::next_time(double t_s) const {
+  if (is_static()) return kInf;
+  const bool over = frames_.empty() || (!stream_.loop && stream_time(t_s) >= end_s_);
+  if (over && !moves_) return kInf;
+  double next = grid_after(t_s);
+  double gap_end_s = 0;
+  while (!frames_.empty() && in_gap(stream_time(next), gap_end_s)) {
+    const double left_s = (gap_end_s - stream_time(next)) / stream_.rate;
+    next = grid_after(next + std::max(left_s - period_s(), 0.0));
+  }
+  return next;
+}
+
+}  // namespace hamel::perception
