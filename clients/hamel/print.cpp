@@ -31,7 +31,7 @@ void print_json(const scene::Scene& scene, const Outcome& o) {
   j["final_error_m"] = scene.steered ? number(o.final_error_m) : nlohmann::ordered_json(nullptr);
   j["min_clearance_m"] = number(o.min_clearance_m);
   j["contacts"] = o.contacts;
-  j["path_length_m"] = number(o.path_length_m);
+  j["path_length_m"] = scene.steered ? number(o.path_length_m) : nlohmann::ordered_json(nullptr);
   j["energy_drift_rel"] = number(o.summary.energy_drift_rel);
   j["iterations_mean"] = number(o.summary.iterations_mean);
   j["iterations_max"] = o.summary.iterations_max;

@@ -17,7 +17,7 @@ namespace hamel::dynamics {
 struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
   bool endless = false;                            ///< ignore the scene's duration: run until told to end
-  std::string state_dir;                           ///< checkpoint folder; empty: none
+  std::string state_dir = {};                           ///< checkpoint folder; empty: none
   std::chrono::milliseconds patience{10000};       ///< lockstep: how long to wait for one command
 };
 

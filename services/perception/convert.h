@@ -6,7 +6,8 @@
 
 namespace hamel::perception {
 
-/// The set number `k` of a source seen at `rate_hz`: sample time k / rate_hz.  `last`: no set will follow by itself.
-void to_wire(const Source& source, std::uint64_t k, double rate_hz, bool last, wire::ObstacleSet& out);
+/// Set number k of a source, of sample time k period.  `promise`: it names the time of its successor, +inf when nothing
+/// will change any more; else the next period.  False inside a gap of the source, where nothing is known.
+bool to_wire(const Source& source, std::uint64_t k, bool promise, wire::ObstacleSet& out);
 
 }  // namespace hamel::perception

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/files/stream_csv.h"
 #include "common/runtime/options.h"
 #include "services/perception/convert.h"
 
@@ -11,15 +10,18 @@ namespace hamel::perception {
 
 using namespace std::chrono_literals;
 
+namespace {
+constexpr std::uint64_t kNever = ~std::uint64_t{0};
+}  // namespace
+
 Checked<std::unique_ptr<PerceptionService>> PerceptionService::make(bus::Node& node, const scene::Scene& scene) {
-  auto source = files::load_source(scene.perception);
+  auto source = Source::make(scene.perception);
   if (!source) return source.error();
   return std::unique_ptr<PerceptionService>(new PerceptionService(node, scene, std::move(source).value()));
 }
 
 PerceptionService::PerceptionService(bus::Node& node, const scene::Scene& scene, Source source)
     : arm_(scene.arm),
-      rate_hz_(scene.perception.rate_hz),
       source_(std::move(source)),
       sets_out_(node),
       status_out_(node),
@@ -69,32 +71,35 @@ double PerceptionService::run_time_s(Time now) const {
 }
 
 bool PerceptionService::publish_until(double t_s) {
-  const bool once = clock_->pace == wire::Pace::lockstep && source_.is_static();
-  if (!next_) next_ = once ? 0 : static_cast<std::uint64_t>(std::floor(std::max(0.0, clock_->t_s) * rate_hz_ + 1e-9));
-  if (once && *next_ > 0) return false;
-  // A long silence is skipped in real time, not replayed in a burst.
-  if (clock_->pace == wire::Pace::realtime)
-    next_ = std::max(*next_, static_cast<std::uint64_t>(std::max(0.0, std::floor(t_s * rate_hz_) - 4)));
+  const bool lockstep = clock_->pace == wire::Pace::lockstep;
+  const auto number_at = [this](double t) {
+    return static_cast<std::uint64_t>(std::floor(std::max(0.0, t) / source_.period_s() + 1e-9));
+  };
+  if (!next_) next_ = number_at(clock_->t_s);
+  // A long silence is skipped in real time, not made up for in a burst.
+  if (!lockstep && number_at(t_s) > *next_ + 4) next_ = number_at(t_s);
   bool any = false;
-  while (static_cast<double>(*next_) / rate_hz_ <= t_s) {
-    publish(*next_);
-    ++*next_;
-    any = true;
-    if (once) break;
+  while (*next_ != kNever && static_cast<double>(*next_) * source_.period_s() <= t_s) {
+    if (to_wire(source_, *next_, lockstep, set_)) {
+      sets_out_.publish(set_);
+      ++published_;
+      any = true;
+    }
+    next_ = lockstep ? after(*next_) : *next_ + 1;
   }
   return any;
 }
 
-void PerceptionService::publish(std::uint64_t k) {
-  const bool last = clock_->pace == wire::Pace::lockstep && source_.is_static();
-  to_wire(source_, k, rate_hz_, last, set_);
-  sets_out_.publish(set_);
-  ++published_;
+/// The number of the set that follows number k where something changes; kNever when nothing will.
+std::uint64_t PerceptionService::after(std::uint64_t k) const {
+  const double next_s = source_.next_time(static_cast<double>(k) * source_.period_s());
+  if (!std::isfinite(next_s)) return kNever;
+  return std::max(k + 1, static_cast<std::uint64_t>(std::llround(next_s / source_.period_s())));
 }
 
 runtime::Clock::time_point PerceptionService::due() const {
   if (!clock_ || !clock_->running || clock_->pace == wire::Pace::lockstep || !next_) return last_status_ + 500ms;
-  const double wait_s = static_cast<double>(*next_) / rate_hz_ - clock_->t_s;
+  const double wait_s = static_cast<double>(*next_) * source_.period_s() - clock_->t_s;
   const auto next = clock_heard_ + std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(wait_s));
   return std::min(next, last_status_ + 500ms);
 }

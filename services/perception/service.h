@@ -12,12 +12,13 @@
 
 namespace hamel::perception {
 
-/// Sets have sample times k / rate_hz on the run's clock; their content depends on k alone, so a restarted perception
+/// Sets have sample times k period_s on the run's clock; their content depends on k alone, so a restarted perception
 /// goes on as if nothing had happened.  In lockstep sets are published one clock message ahead, so that the planner
-/// need not wait for them; in real time when their time has come.
+/// need not wait for them, and none where nothing changes; in real time each period, when its time has come.  Inside a
+/// gap of a stream nothing is published: the planner's last set grows old and it says so.
 class PerceptionService final : public runtime::Service {
  public:
-  /// Fails where a stream cannot be read.
+  /// Fails with what scene::problems() says of the scene's perception.
   static Checked<std::unique_ptr<PerceptionService>> make(bus::Node& node, const scene::Scene& scene);
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
@@ -31,11 +32,10 @@ class PerceptionService final : public runtime::Service {
   bool hear_clock(Time now);
   double run_time_s(Time now) const;
   bool publish_until(double t_s);
-  void publish(std::uint64_t k);
+  std::uint64_t after(std::uint64_t k) const;
   void publish_status(Time now, wire::ServiceState state);
 
   const std::uint32_t arm_;
-  const double rate_hz_;
   const Source source_;
   wire::Publisher<wire::ObstacleSet> sets_out_;
   wire::Publisher<wire::ServiceStatus> status_out_;

@@ -16,7 +16,7 @@ namespace hamel::planner {
 
 struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
-  std::string state_dir;                           ///< checkpoint folder; empty: none
+  std::string state_dir = {};                           ///< checkpoint folder; empty: none
 };
 
 class PlannerService final : public runtime::Service {
