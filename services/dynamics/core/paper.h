@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/dynamics/core/increment_root.h"
+#include "services/dynamics/core/newton.h"
 #include "services/dynamics/core/tier.h"
 
 namespace hamel::dynamics {
@@ -27,6 +28,7 @@ class PaperStep final : public TierStep {
   void correct(VectorXd& d) noexcept;
 
  private:
+  void linearise() noexcept;
   double force(int i, double d) const noexcept;
   void gather(const Node& node, double share, double sign, VectorXd& p) noexcept;
 
@@ -37,6 +39,7 @@ class PaperStep final : public TierStep {
   double h_ = 0;
   VectorXd d_, r_, p_, u_;
   std::vector<rbd::Half6<double>> V_, momentum_;
+  ChainNewton newton_;
 };
 
 }  // namespace hamel::dynamics
