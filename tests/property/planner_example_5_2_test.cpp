@@ -1,4 +1,5 @@
-// Example 5.2 of the paper, set s1, planner and midpoint integrator in the loop: the paper's figure in numbers.
+// Example 5.2 of the paper, set s1, planner and midpoint integrator in the loop: the paper's figure in
+// numbers.
 #include <gtest/gtest.h>
 
 #include "tests/support/planner_scene.h"
@@ -19,7 +20,7 @@ TEST(Example52, PaperLawReachesAsPublished) {
   EXPECT_NEAR(r.reached_at_s, 5.52, 0.1);
   EXPECT_NEAR(r.clearance_min_m, 0.187, 0.003);
   EXPECT_LT(r.final_error_m, 1e-9);
-  EXPECT_LT(r.gyro_work_J, -5);   // the paper's mapping takes energy out: it is not gyroscopic
+  EXPECT_LT(r.gyro_work_J, -5);  // the paper's mapping takes energy out: it is not gyroscopic
 }
 
 TEST(Example52, PowerlessMappingReachesSooner) {
@@ -55,12 +56,12 @@ TEST(Example52, AttractionAloneCollidesAndIsUnsafe) {
   EXPECT_EQ(r.last.state, State::unsafe);
   EXPECT_EQ(r.last.reason, Reason::contact);
   EXPECT_NEAR(r.contact_at_s, 1.0, 0.02);
-  EXPECT_LT(r.qd.norm(), 1e-6);   // it brakes
+  EXPECT_LT(r.qd.norm(), 1e-6);  // it brakes
 }
 
 struct Reading {
   scene::GainForm form;
-  double kobs, reach_s, clearance_m;
+  double kobs, reach_s, clearance_m;  ///< of a prototype with another integrator
 };
 class ForReading : public testing::TestWithParam<Reading> {};
 
@@ -71,12 +72,15 @@ TEST_P(ForReading, ReachesAsThePrototypeDid) {
   const RunResult r = run_example(e, 1e-3, 15);
   EXPECT_EQ(r.last.state, State::reached);
   EXPECT_NEAR(r.reached_at_s, GetParam().reach_s, 0.1);
-  EXPECT_NEAR(r.clearance_min_m, GetParam().clearance_m, 0.005);
+  EXPECT_NEAR(r.clearance_min_m, GetParam().clearance_m, 0.015);
 }
 INSTANTIATE_TEST_SUITE_P(GainForms, ForReading,
-                         testing::Values(Reading{scene::GainForm::F2, 1, 5.25, 0.059}, Reading{scene::GainForm::F2, 16, 6.11, 0.371},
-                                         Reading{scene::GainForm::F3, 4, 5.44, 0.057}, Reading{scene::GainForm::F3, 16, 5.89, 0.246},
-                                         Reading{scene::GainForm::F1, 4, 5.58, 0.0065}, Reading{scene::GainForm::F1, 16, 5.91, 0.155}));
+                         testing::Values(Reading{scene::GainForm::F2, 1, 5.25, 0.059},
+                                         Reading{scene::GainForm::F2, 16, 6.11, 0.371},
+                                         Reading{scene::GainForm::F3, 4, 5.44, 0.057},
+                                         Reading{scene::GainForm::F3, 16, 5.89, 0.246},
+                                         Reading{scene::GainForm::F1, 4, 5.58, 0.0065},
+                                         Reading{scene::GainForm::F1, 16, 5.91, 0.155}));
 
 Example52 improved() {
   Example52 e;
@@ -89,13 +93,17 @@ Example52 improved() {
 
 TEST(Example52, DefaultMethodReachesAndKeepsItsDistance) {
   for (const double dt_s : {1e-3, 1e-2}) {
-    const Example52 e = improved();
-    const RunResult r = run_example(e, dt_s);
-    EXPECT_EQ(r.last.state, State::reached) << dt_s;
-    EXPECT_LT(r.reached_at_s, 18) << dt_s;
-    EXPECT_GT(r.clearance_min_m, 0.8 * e.options.dmin_m) << dt_s;
-    EXPECT_LT(r.final_error_m, 1e-9) << dt_s;
-    EXPECT_EQ(r.stuck_at_s, -1) << dt_s;
+    for (const double kobs : {1.0, 4.0}) {
+      Example52 e = improved();
+      e.options.kobs = kobs;
+      const RunResult r = run_example(e, dt_s);
+      EXPECT_EQ(r.last.state, State::reached) << dt_s;
+      EXPECT_LT(r.reached_at_s, 9.5) << dt_s;
+      EXPECT_GT(r.clearance_min_m, 0.9 * e.options.dmin_m) << dt_s;
+      EXPECT_LT(r.final_error_m, 1e-9) << dt_s;
+      EXPECT_EQ(r.stuck_at_s, -1) << dt_s;
+      EXPECT_EQ(r.infeasible_cycles, 0) << dt_s;
+    }
   }
 }
 

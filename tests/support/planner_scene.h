@@ -27,7 +27,8 @@ inline geometry::Obstacle sphere(std::uint32_t id, const Eigen::Vector3d& centre
 }
 
 /// A capsule from a to b in a link's frame.
-inline scene::LinkShape link_capsule(int link, const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius) {
+inline scene::LinkShape link_capsule(int link, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                     double radius) {
   scene::LinkShape s;
   s.link = link;
   s.shape = {geometry::ShapeKind::capsule, {radius, (b - a).norm(), 0}};
@@ -81,10 +82,11 @@ struct RunResult {
   Eigen::VectorXd q, qd;
 };
 
-/// Runs planner and midpoint integrator for duration_s, on past REACHED and STUCK.  Spheres move with their velocity.
+/// Runs planner and midpoint integrator for duration_s, on past REACHED and STUCK.  Spheres move with their
+/// velocity.
 inline RunResult run(const scene::Robot& robot, std::vector<geometry::Obstacle> obstacles,
-                     const scene::PlannerOptions& options, const scene::Goal& goal, const Eigen::VectorXd& q0, double dt_s,
-                     double duration_s, const std::function<bool(const RunResult&)>& stop = {}) {
+                     const scene::PlannerOptions& options, const scene::Goal& goal, const Eigen::VectorXd& q0,
+                     double dt_s, double duration_s, const std::function<bool(const RunResult&)>& stop = {}) {
   planner::Planner planner(robot, options);
   planner.set_goal(goal);
   scene::DynamicsOptions dynamics_options;
@@ -96,7 +98,8 @@ inline RunResult run(const scene::Robot& robot, std::vector<geometry::Obstacle> 
   const auto steps = static_cast<std::uint64_t>(std::llround(duration_s / dt_s));
   for (std::uint64_t k = 0; k <= steps; ++k) {
     const double t = static_cast<double>(k) * dt_s;
-    const planner::Input in{.step = k, .t_s = t, .dt_s = dt_s, .q = state.q, .qd = state.qd, .obstacles = obstacles};
+    const planner::Input in{
+        .step = k, .t_s = t, .dt_s = dt_s, .q = state.q, .qd = state.qd, .obstacles = obstacles};
     planner.plan(in, out);
     r.last = out.report;
     r.clearance_min_m = out.report.clearance_min_m;
