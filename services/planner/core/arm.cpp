@@ -42,19 +42,23 @@ Arm::Arm(const model::Chain& with_gravity)
       reach_m(reach(chain)),
       shoulder_W(chain.X_WB0() * chain.joint(0).X_PJ.p) {}
 
-void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept {
+void Arm::look(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept {
   q = q_now;
-  qd.setZero();
-  rbd::inverse_dynamics(chain, q, qd_now, qd, ws, coriolis);  // qd serves as the zero acceleration
   qd = qd_now;
   rbd::velocities(chain, q, qd, ws);
+  X_WE = rbd::tip(chain, ws);
+  rbd::frame_jacobian(chain, ws, n() - 1, X_WE.p, J_E);
+  V_WE.noalias() = J_E * qd;
+}
+
+void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept {
+  qd.setZero();  // serves as the zero acceleration
+  rbd::inverse_dynamics(chain, q_now, qd_now, qd, ws, coriolis);
+  look(q_now, qd_now);
   rbd::mass_matrix(chain, ws, M);
   M_llt.compute(M);
   M_inverse.setIdentity();
   M_llt.solveInPlace(M_inverse);
-  X_WE = rbd::tip(chain, ws);
-  rbd::frame_jacobian(chain, ws, n() - 1, X_WE.p, J_E);
-  V_WE.noalias() = J_E * qd;
 }
 
 Eigen::Vector3d Arm::angular_velocity(int link) const noexcept {

@@ -13,7 +13,9 @@ namespace hamel::planner {
 /// it.
 struct Arm {
   explicit Arm(const model::Chain& chain);
-  /// No allocation.
+  /// Poses and velocities alone: ws, X_WE, J_E, V_WE.  No allocation.
+  void look(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept;
+  /// Everything.  No allocation.
   void update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept;
   int n() const noexcept { return chain.n(); }
   /// Angular velocity of a link, world axes.

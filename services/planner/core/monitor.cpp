@@ -49,7 +49,7 @@ Verdict judge(const scene::PlannerOptions& o, Memory& m, const Progress& now) no
   else if (m.within_since_s < 0)
     m.within_since_s = now.t_s;
   if (m.within_since_s >= 0 && now.t_s - m.within_since_s >= o.goal_hold_s) {
-    if (m.time_to_goal_s < 0) m.time_to_goal_s = now.t_s - m.goal_start_s;
+    if (m.time_to_goal_s < 0) m.time_to_goal_s = m.within_since_s - m.goal_start_s;
     return {State::reached, Reason::none, "at the goal"};
   }
 

@@ -79,16 +79,21 @@ void Pairs::clear() noexcept {
   for (Nearest& n : nearest_) n = Nearest{};
 }
 
+geometry::Capsule Pairs::link_W(const Arm& arm, int shape) const noexcept {
+  const Body& body = bodies_[static_cast<std::size_t>(shape)];
+  return arm.ws.X_WB[static_cast<std::size_t>(body.link)] * body.capsule_B;
+}
+
 void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
   clear();
   for (const Body& body : bodies_) {
-    const geometry::Capsule link_W = arm.ws.X_WB[static_cast<std::size_t>(body.link)] * body.capsule_B;
+    const geometry::Capsule capsule = link_W(arm, body.index);
     Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
     for (const Obstacles::Item& item : obstacles.items()) {
-      const double bound = geometry::distance_bound(link_W, item.now.shape, item.now.X_WO);
+      const double bound = geometry::distance_bound(capsule, item.now.shape, item.now.X_WO);
       if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
       Pair pair;
-      pair.at = geometry::closest(link_W, item.now.shape, item.now.X_WO);
+      pair.at = geometry::closest(capsule, item.now.shape, item.now.X_WO);
       if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
       pair.d = pair.at.distance_m - item.inflation_m;
       if (!(pair.d <= options_.rho0_m)) continue;
@@ -132,6 +137,16 @@ void Pairs::keep_nearest_of_each_link() noexcept {
       pairs_[kept - 1] = pairs_[k];
   }
   count_ = kept;
+}
+
+void Pairs::advance(const Arm& arm, double ahead_s) noexcept {
+  for (Pair& pair : items()) {
+    lie::Pose X_WO = pair.item->now.X_WO;
+    X_WO.p += ahead_s * pair.item->now.V_WO.tail<3>();
+    pair.at = geometry::closest(link_W(arm, pair.shape), pair.item->now.shape, X_WO);
+    pair.d = pair.at.distance_m - pair.item->inflation_m;
+    pair.n = pair.at.normal;
+  }
 }
 
 void Pairs::complete(const Arm& arm) noexcept {

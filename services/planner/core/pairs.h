@@ -66,6 +66,8 @@ class Pairs {
   void clear() noexcept;
   /// Distances of every link shape to every obstacle; those within rho0 become pairs.
   void find(const Arm& arm, const Obstacles& obstacles) noexcept;
+  /// The same pairs `ahead_s` later, the arm having gone there too.
+  void advance(const Arm& arm, double ahead_s) noexcept;
   /// Velocities, Jacobians and operational inertias of the pairs.
   void complete(const Arm& arm) noexcept;
 
@@ -88,6 +90,7 @@ class Pairs {
   double tip_radius_m() const noexcept { return tip_radius_m_; }
 
  private:
+  geometry::Capsule link_W(const Arm& arm, int shape) const noexcept;
   void offer(const Pair& pair) noexcept;
   void keep_nearest_of_each_link() noexcept;
 

@@ -46,12 +46,13 @@ struct Planner::Impl {
   }
 
   Verdict see(const Input& in) noexcept;
+  void prepare(const Input& in) noexcept;
   Verdict move(const Input& in, VectorXd& tau) noexcept;
   void steer(const Input& in, bool unreachable, VectorXd& tau) noexcept;
   void circulate(double t_s, VectorXd& tau) noexcept;
   bool guard(VectorXd& tau) noexcept;
   void brake(double dt_s, VectorXd& tau) const noexcept;
-  void report(const Input& in, const Verdict& verdict, Report& out) noexcept;
+  void report(const Verdict& verdict, Report& out) noexcept;
   void report_links(Report& out) const noexcept;
   double slow_down(const Input& in) const noexcept;
   bool target_blocked() const noexcept;
@@ -69,6 +70,7 @@ struct Planner::Impl {
   std::vector<HeldPair> scratch;
   scene::Goal goal;
   bool has_goal = false, goal_fits = true;
+  double tip_speed = 0;
   Memory memory;
 };
 
@@ -121,7 +123,7 @@ void Planner::plan(const Input& in, Output& out) noexcept {
   }
   p.memory.state = static_cast<std::uint64_t>(verdict.state);
   p.memory.reason = static_cast<std::uint64_t>(verdict.reason);
-  p.report(in, verdict, out.report);
+  p.report(verdict, out.report);
 }
 
 // Takes the input in and says why the arm may not move, or MOVING.
@@ -137,14 +139,14 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
     arm.q.setConstant(std::nan(""));
     return {State::unsafe, Reason::non_finite, "the arm's state is not finite"};
   }
-  arm.update(in.q, in.qd);
+  arm.look(in.q, in.qd);
   remember_tip();
   obstacles.take(in.obstacles, in.obstacle_age_s, options);
   pairs.find(arm, obstacles);
   memory.clearance_min_m = std::min(memory.clearance_min_m, pairs.clearance_m());
   const bool contact = pairs.clearance_m() < 0;
   memory.contacts += contact;
-  pairs.complete(arm);
+  prepare(in);
 
   const bool was_contact = static_cast<Reason>(memory.reason) == Reason::contact;
   if (!(in.dt_s >= kLeastPeriod_s) || !std::isfinite(in.dt_s))
@@ -166,6 +168,21 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
   return {State::moving};
 }
 
+// Brings arm and pairs to where the forces are evaluated.  The torque holds for a whole period, so `gyro`
+// takes the middle of it: at dt 1 ms its barrier then keeps 96 % of dmin in example 5.2 instead of 87 %, at
+// 10 ms 91 instead of 53 %.  The paper's methods take its beginning, as published.
+void Planner::Impl::prepare(const Input& in) noexcept {
+  const bool ahead = options.method == Method::gyro && in.dt_s > 0 && std::isfinite(in.dt_s);
+  if (ahead) {
+    qdd = in.q + 0.5 * in.dt_s * in.qd;
+    arm.update(qdd, in.qd);
+    pairs.advance(arm, 0.5 * in.dt_s);
+  } else {
+    arm.update(in.q, in.qd);
+  }
+  pairs.complete(arm);
+}
+
 // The command of a cycle in which nothing is unsafe, and how the goal stands.
 Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
   const bool steered = has_goal;
@@ -178,7 +195,7 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
     now.t_s = in.t_s;
     now.scaled_error = attraction.error().scaled;
     const bool joints = goal.kind == scene::GoalKind::joints;
-    now.speed = joints ? arm.qd.lpNorm<Eigen::Infinity>() : arm.V_WE.tail<3>().norm();
+    now.speed = joints ? arm.qd.lpNorm<Eigen::Infinity>() : tip_speed;
     now.out_of_reach =
         joints ? attraction.beyond_limits(arm, goal)
                : (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
@@ -289,18 +306,21 @@ void Planner::Impl::remember_tip() noexcept {
   if (memory.tip_known) memory.path_length_m += (arm.X_WE.p - vector(memory.tip_m)).norm();
   memory.tip_known = 1;
   memory.tip_m = triple(arm.X_WE.p);
+  tip_speed = arm.V_WE.tail<3>().norm();
 }
 
-void Planner::Impl::report(const Input& in, const Verdict& verdict, Report& out) noexcept {
-  (void)in;
+void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.state = verdict.state;
   out.reason = verdict.reason;
   out.detail = verdict.detail;
+  out.speed_mps = tip_speed;
+  out.end_effector_m = vector(memory.tip_m);
   out.goal_id = has_goal ? goal.id : 0;
-  out.target_error_m = has_goal ? attraction.error().position_m : 0;
+  const bool joints = goal.kind == scene::GoalKind::joints;
+  out.target_error_m = !has_goal ? 0
+                       : joints  ? attraction.error().position_m
+                                 : (attraction.target_W() - out.end_effector_m).norm();
   out.orientation_error_rad = has_goal ? attraction.error().angle_rad : 0;
-  out.speed_mps = arm.V_WE.tail<3>().norm();
-  out.end_effector_m = arm.X_WE.p;
   out.clearance_m = pairs.clearance_m();
   out.clearance_min_m = memory.clearance_min_m;
   out.contacts = memory.contacts;
