@@ -245,6 +245,31 @@ TEST(Linear, EvaluationsDoNotGrowWithTheChain) {
   }
 }
 
+/// At joints that carry no torque the momentum stays zero as a sum of parts that cancel: rounding must be known by
+/// the parts.
+TEST(Start, ATorqueAtOneJointSetsARestingArmInMotion) {
+  for (const Tier tier : {Tier::midpoint, Tier::hamel})
+    for (const Root root : {Root::feedback, Root::newton})
+      for (const double dt_s : {1e-4, 1e-3, 1e-2}) {
+        auto spec = test::planar(4, 1, 1, 1);
+        spec.gravity_W_mps2.setZero();
+        const model::Chain chain = test::checked(spec);
+        Options options;
+        options.tier = tier;
+        options.root = root;
+        options.dt_s = dt_s;
+        Integrator integrator(chain, options);
+        State state = integrator.start(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Zero(4));
+        const Eigen::VectorXd tau = Eigen::Vector4d(0.25, 0, 0, 0);
+        for (int k = 0; k < 200; ++k) {
+          const StepReport r = integrator.step(state, tau);
+          ASSERT_TRUE(r.usable()) << scene::to_string(tier) << " dt " << dt_s << " step " << k;
+          ASSERT_EQ(r.substeps, 1);
+        }
+        EXPECT_GT(state.q[0], 0);
+      }
+}
+
 TEST(Start, PutsMomentumIntoTheState) {
   const model::Chain chain = test::paper_5_1();
   const Integrator integrator(chain, {});

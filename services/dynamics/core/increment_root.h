@@ -61,7 +61,7 @@ struct Residual {
 };
 
 /// Relative residual that counts as rounding: reached, the iteration stops.
-inline constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
+inline constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
 /// Relative residual below which one look without progress means that rounding is reached ...
 inline constexpr double kFloor = 1e-12;
 /// ... and below which several in a row do: slow convergence is not stagnation.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/dynamics/core/rounding.h"
+
 namespace hamel::dynamics {
 namespace {
 
@@ -11,7 +13,6 @@ namespace {
 constexpr double kExtraShare = 0.02;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-double norm1(const lie::Vec3<double>& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
 }  // namespace
 
@@ -94,10 +95,12 @@ Residual MidpointStep::backward(const VectorXd& d) noexcept {
   Residual worst;
   rbd::Half6<double> H;      // composite momentum
   lie::Vec3<double> moment;  // composite first moment of mass: w_i = (moment x g, mass g)
+  MomentumParts parts;
   for (int i = chain_.n(); i-- > 0;) {
     const rbd::AxisLink& k = chain_[i];
     const lie::Vec3<double>& g = g_[at(i)];
     H = H + momentum_[at(i)];
+    parts.add(k, V_[at(i)]);
     moment += k.h;
     H_[at(i)] = H;
     moment_[at(i)] = moment;
@@ -107,7 +110,7 @@ Residual MidpointStep::backward(const VectorXd& d) noexcept {
     const double push = 0.5 * h_ * force(i, d[i]);
     r_[i] = p - turn - from_->p[i] - push;
     p_next_[i] = p + turn + push;
-    const double scale = std::abs(from_->p[i]) + norm1(k.prismatic ? H.l : H.a) + std::abs(turn) +
+    const double scale = std::abs(from_->p[i]) + parts.along(k) + k.armature * std::abs(d[i]) / h_ + std::abs(turn) +
                          std::abs(push) + h_ * k.weight + std::numeric_limits<double>::min();
     if (!std::isfinite(r_[i])) return {r_[i], r_[i]};
     worst.torque_Nm = std::max(worst.torque_Nm, std::abs(r_[i]) / h_);
@@ -115,6 +118,7 @@ Residual MidpointStep::backward(const VectorXd& d) noexcept {
     if (i == 0) break;
     const rbd::LinkPose<double>& X = X_[at(i)];
     H = to_parent(X, H);
+    parts.shift(X.p);
     moment = X.R * moment + k.outer_mass * X.p;
   }
   return worst;

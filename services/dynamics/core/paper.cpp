@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/dynamics/core/rounding.h"
+
 namespace hamel::dynamics {
 namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -69,15 +71,18 @@ Residual PaperStep::evaluate(const VectorXd& d) noexcept {
   }
   gather(*from_, 1 - options_.alpha, -1, p_);
   Residual worst;
-  for (int i = 0; i < chain_.n(); ++i) {
+  MomentumParts parts;
+  for (int i = chain_.n(); i-- > 0;) {
     const rbd::AxisLink& k = chain_[i];
+    parts.add(k, V_[at(i)]);
     const double p = p_[i] + k.armature * d[i] / h_, push = 0.5 * h_ * force(i, d[i]);
     r_[i] = p - from_->p[i] - push;
-    const double scale = std::abs(from_->p[i]) + std::abs(p) + std::abs(push) + h_ * k.weight +
+    const double scale = std::abs(from_->p[i]) + parts.along(k) + k.armature * std::abs(d[i]) / h_ + std::abs(push) + h_ * k.weight +
                          std::numeric_limits<double>::min();
     if (!std::isfinite(r_[i])) return {r_[i], r_[i]};
     worst.torque_Nm = std::max(worst.torque_Nm, std::abs(r_[i]) / h_);
     worst.relative = std::max(worst.relative, std::abs(r_[i]) / scale);
+    parts.shift(from_->X[at(i)].p);
   }
   return worst;
 }
