@@ -68,7 +68,7 @@ std::string configuration(const NodeOptions& options, const Interface& interface
       element("Interfaces", "<NetworkInterface address=\"" + interface.address + "\"/>") +
       element("AllowMulticast", peers.empty() ? "spdp" : "false");
   const std::string discovery = element("ParticipantIndex", "auto") +
-                                element("MaxAutoParticipantIndex", std::to_string(kMaxParticipantIndex)) +
+                                element("MaxAutoParticipantIndex", std::to_string(kMaxParticipantIndex + 1)) +
                                 element("LeaseDuration", kLease) + element("SPDPInterval", kAnnouncement) +
                                 element("Peers", list);
   // A writer waits for slow readers above this mark; keep-last already bounds what it holds.

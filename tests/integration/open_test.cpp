@@ -76,7 +76,7 @@ TEST_P(Open, OpensAndClosesAgainAndAgain) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Vendors, Open, testing::Values(Vendor::fastdds, Vendor::cyclonedds),
-                         [](const auto& info) { return std::string(to_string(info.param)); });
+                         [](const auto& tested) { return std::string(to_string(tested.param)); });
 
 TEST(Vendors, AreFoundByName) {
   EXPECT_EQ(bus::vendor_from("cyclonedds").value(), Vendor::cyclonedds);
