@@ -217,7 +217,9 @@ TEST(Planner, DoesNotCareInWhichOrderObstaclesArrive) {
   o.barrier_gain = 12, o.kc = 2, o.rho0_m = 0.5;
   Planner p(robot, o), r(robot, o);
   Output a = p.output(), b = r.output();
-  p.set_goal(random_goal(rng, 6, 1));
+  const scene::Goal goal = random_goal(rng, 6, 1);
+  p.set_goal(goal);
+  r.set_goal(goal);
   rbd::Workspace ws(robot.chain);
   for (std::uint64_t k = 0; k < 1000; ++k) {
     Fuzz f = random_cycle(rng, robot.chain, ws);

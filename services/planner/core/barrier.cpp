@@ -12,12 +12,8 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr int kMostSweeps = 60;
-constexpr double kRegularisation = 1e-6;  // of a row's own stiffness
-constexpr double kSettled = 1e-9;         // a sweep that changes accelerations by less than this, relatively
-constexpr double kViolated = 1e-2;        // relative; a row missed by more is infeasible
-constexpr double kImmovable = 1e-12;      // a row no joint can act on
-constexpr double kLimitHorizon = 0.5;     // joint rows begin so far from a limit [rad or m]
+constexpr double kImmovable = 1e-12;   // a row no joint can act on
+constexpr double kLimitHorizon = 0.5;  // joint rows begin so far from a limit [rad or m]
 
 }  // namespace
 
@@ -44,22 +40,26 @@ double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept
   return F_tautau - D * (m_link * m_link + 2 * cosine * m_link * m_there + m_there * m_there) / sine2;
 }
 
-Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options) : options_(options) {
+Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options)
+    : options_(options), least_norm_(arm.n(), static_cast<Eigen::Index>(kMaxPairs) + 4 * arm.n()) {
   const Eigen::Index most = static_cast<Eigen::Index>(kMaxPairs) + 4 * arm.n();
-  A_ = Eigen::MatrixXd::Zero(arm.n(), most);
-  Y_ = A_;
-  b_ = diagonal_ = lambda_ = VectorXd::Zero(most);
+  A_ = Eigen::MatrixXd::Zero(arm.n(), most + 1);  // one spare: a row is written before it is judged
+  C_ = A_;
+  b_ = s_ = length_ = VectorXd::Zero(most + 1);
+  x_ = VectorXd::Zero(arm.n());
   pair_of_row_.reserve(kMaxPairs);
 }
 
 // A_.col(rows_) is filled; finishes the row unless nothing can act on it.
 void Barrier::add_row(const Arm& arm, double b) noexcept {
-  Y_.col(rows_).noalias() = arm.M_inverse.lazyProduct(A_.col(rows_));
-  const double stiffness = A_.col(rows_).dot(Y_.col(rows_));
-  if (!(stiffness > kImmovable) || !std::isfinite(b)) return;
-  diagonal_[rows_] = stiffness;
+  auto c = C_.col(rows_);
+  c = A_.col(rows_);
+  arm.M_llt.matrixL().solveInPlace(c);
+  const double length = c.norm();
+  if (!(length * length > kImmovable) || !std::isfinite(b)) return;
+  c /= length;
+  length_[rows_] = length;
   b_[rows_] = b;
-  lambda_[rows_] = 0;
   ++rows_;
 }
 
@@ -102,27 +102,20 @@ Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, VectorXd& a) noexc
   rows_ = 0;
   add_pair_rows(arm, pairs);
   add_joint_rows(arm);
+  for (Eigen::Index i = 0; i < rows_; ++i) s_[i] = (b_[i] - A_.col(i).dot(a)) / length_[i];
+  const LeastNorm::Outcome found = least_norm_.solve(C_, s_, rows_);
   Outcome outcome;
   outcome.rows = static_cast<int>(rows_);
-  const double scale = 1 + a.norm();
-  for (bool moving = rows_ > 0; moving && outcome.sweeps < kMostSweeps; ++outcome.sweeps) {
-    moving = false;
-    for (Eigen::Index i = 0; i < rows_; ++i) {
-      const double missing = b_[i] - A_.col(i).dot(a) - kRegularisation * diagonal_[i] * lambda_[i];
-      const double next = std::max(0.0, lambda_[i] + missing / ((1 + kRegularisation) * diagonal_[i]));
-      const double change = next - lambda_[i];
-      if (change == 0) continue;
-      lambda_[i] = next;
-      a.noalias() += change * Y_.col(i);
-      moving |= std::abs(change) * std::sqrt(diagonal_[i]) > kSettled * scale;
-    }
+  outcome.steps = least_norm_.steps();
+  outcome.active = least_norm_.steps() > 0;
+  outcome.infeasible = found != LeastNorm::Outcome::solved;
+  x_ = least_norm_.x();
+  arm.M_llt.matrixU().solveInPlace(x_);
+  a += x_;
+  for (std::size_t r = 0; r < pair_of_row_.size(); ++r) {
+    const auto row = static_cast<Eigen::Index>(r);  // pairs come first
+    pairs.items()[pair_of_row_[r]].multiplier = least_norm_.multipliers()[row] / length_[row];
   }
-  for (Eigen::Index i = 0; i < rows_; ++i) {
-    outcome.active |= lambda_[i] > 0;
-    outcome.infeasible |= b_[i] - A_.col(i).dot(a) > kViolated * (1 + std::abs(b_[i]));
-  }
-  for (std::size_t r = 0; r < pair_of_row_.size(); ++r)
-    pairs.items()[pair_of_row_[r]].multiplier = lambda_[static_cast<Eigen::Index>(r)];
   return outcome;
 }
 

@@ -6,6 +6,7 @@
 
 #include "common/scene/options.h"
 #include "services/planner/core/arm.h"
+#include "services/planner/core/least_norm.h"
 #include "services/planner/core/pairs.h"
 
 namespace hamel::planner {
@@ -20,7 +21,7 @@ class Barrier {
   Barrier(const Arm& arm, const scene::PlannerOptions& options);
 
   struct Outcome {
-    int rows = 0, sweeps = 0;
+    int rows = 0, steps = 0;
     bool active = false;      ///< some row pushed
     bool infeasible = false;  ///< the rows contradict each other: no acceleration meets them all
   };
@@ -28,7 +29,8 @@ class Barrier {
   ///   pairs:          hdd + 2 g hd + g^2 h >= 0,  h = d - dmin
   ///   joints:         the same with the distance to each limit near enough, and |qd| within the velocity
   ///   limit
-  /// by projected Gauss-Seidel on the dual.  @param a  in: a0, out: the minimiser
+  /// exactly, by an active-set method in x = L^T (a - a0), M = L L^T.  @param a  in: a0, out: the minimiser;
+  /// where infeasible: what meets the rows taken in before the contradiction, the most violated first
   Outcome solve(const Arm& arm, Pairs& pairs, Eigen::VectorXd& a) noexcept;
 
  private:
@@ -37,8 +39,9 @@ class Barrier {
   void add_joint_rows(const Arm& arm) noexcept;
 
   const scene::PlannerOptions& options_;
-  Eigen::MatrixXd A_, Y_;  ///< a row's coefficients as a column; M^-1 times it
-  Eigen::VectorXd b_, diagonal_, lambda_;
+  LeastNorm least_norm_;
+  Eigen::MatrixXd A_, C_;  ///< a row's coefficients as a column; L^-1 times it, to length 1
+  Eigen::VectorXd b_, s_, length_, x_;
   std::vector<std::size_t> pair_of_row_;
   Eigen::Index rows_ = 0;
 };

@@ -331,7 +331,7 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.pairs_in_range = static_cast<int>(pairs.items().size());
   out.pairs_dropped = pairs.dropped();
   out.barrier_rows = outcome.rows;
-  out.barrier_sweeps = outcome.sweeps;
+  out.barrier_steps = outcome.steps;
   report_links(out);
 }
 

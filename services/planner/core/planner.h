@@ -86,12 +86,12 @@ struct Report {
   std::uint64_t contacts = 0;                                        ///< cycles with clearance < 0 so far
   double path_length_m = 0;                                          ///< of the end effector so far
   double time_to_goal_s = -1;                                        ///< < 0: not reached yet
-  double gyroscopic_power_W = 0;  ///< 0 but for rounding where the mapping is powerless
-  double injected_power_W = 0;    ///< by moving obstacles and circulation
-  int pairs_in_range = 0;         ///< (link shape, obstacle) pairs acted on
-  int pairs_dropped = 0;          ///< in range but beyond kMaxPairs: the farthest ones
-  int barrier_rows = 0, barrier_sweeps = 0;
-  std::vector<LinkReport> links;  ///< n, from base to tip
+  double gyroscopic_power_W = 0;            ///< 0 but for rounding where the mapping is powerless
+  double injected_power_W = 0;              ///< by moving obstacles and circulation
+  int pairs_in_range = 0;                   ///< (link shape, obstacle) pairs acted on
+  int pairs_dropped = 0;                    ///< in range but beyond kMaxPairs: the farthest ones
+  int barrier_rows = 0, barrier_steps = 0;  ///< rows seen, steps of its active set
+  std::vector<LinkReport> links;            ///< n, from base to tip
 };
 
 /// What one cycle writes.  Make it with Planner::output() so that plan() has nothing to allocate.
