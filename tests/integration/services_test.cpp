@@ -53,7 +53,7 @@ class RelayedPlanner {
       if (s.step == flip_at_) {
         std::uint64_t bits;
         std::memcpy(&bits, c.torque.data(), sizeof bits);
-        bits ^= 1;
+        bits ^= std::uint64_t{1} << 40;  // the lowest ones vanish in the rounding of the step
         std::memcpy(c.torque.data(), &bits, sizeof bits);
       }
       commands_.publish(c);

@@ -270,6 +270,23 @@ TEST(Start, ATorqueAtOneJointSetsARestingArmInMotion) {
       }
 }
 
+/// Momentum halves each few steps for a million of them: it ends in the denormal numbers, not in a refusal.
+TEST(Rest, IsReachedAndKept) {
+  for (const Tier tier : {Tier::midpoint, Tier::hamel}) {
+    auto spec = test::planar(4, 1, 1, 1);
+    spec.gravity_W_mps2.setZero();
+    const model::Chain chain = test::checked(spec);
+    Integrator integrator(chain, {.tier = tier, .dt_s = 1e-2});
+    State state = integrator.start(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Constant(4, 0.1));
+    Eigen::VectorXd brake(4);
+    for (int k = 0; k < 3000; ++k) {
+      brake = -40 * state.p;
+      ASSERT_TRUE(integrator.step(state, brake).usable()) << "step " << k << " p " << state.p.transpose();
+    }
+    EXPECT_LT(state.p.norm(), 1e-100);
+  }
+}
+
 TEST(Start, PutsMomentumIntoTheState) {
   const model::Chain chain = test::paper_5_1();
   const Integrator integrator(chain, {});

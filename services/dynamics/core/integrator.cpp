@@ -8,6 +8,7 @@
 #include "common/rbd/rbd.h"
 #include "services/dynamics/core/midpoint.h"
 #include "services/dynamics/core/paper.h"
+#include "services/dynamics/core/rounding.h"
 #include "services/dynamics/core/rivals.h"
 
 namespace hamel::dynamics {
@@ -106,7 +107,7 @@ bool Integrator::Impl::sane(const StepReport& report, const VectorXd& tau, doubl
     if (!axis[i].prismatic && std::abs(d - h * now.qd[i]) > kTurnBound) return false;
     work += std::abs(tau[i] * d);
   }
-  const double in_play = now.energy_J - now.potential_J + work + axis.energy_scale;
+  const double in_play = now.energy_J - now.potential_J + work + axis.energy_scale + kNothing;
   return std::abs(next.energy_J - now.energy_J - report.work_J) <= kEnergyBound * in_play;
 }
 

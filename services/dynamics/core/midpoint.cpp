@@ -111,7 +111,7 @@ Residual MidpointStep::backward(const VectorXd& d) noexcept {
     r_[i] = p - turn - from_->p[i] - push;
     p_next_[i] = p + turn + push;
     const double scale = std::abs(from_->p[i]) + parts.along(k) + k.armature * std::abs(d[i]) / h_ + std::abs(turn) +
-                         std::abs(push) + h_ * k.weight + std::numeric_limits<double>::min();
+                         std::abs(push) + h_ * k.weight + kNothing;
     if (!std::isfinite(r_[i])) return {r_[i], r_[i]};
     worst.torque_Nm = std::max(worst.torque_Nm, std::abs(r_[i]) / h_);
     worst.relative = std::max(worst.relative, std::abs(r_[i]) / scale);

@@ -10,6 +10,10 @@
 
 namespace hamel::dynamics {
 
+/// A momentum [kg m^2/s] or energy [J] that is nothing: an arm that comes to rest under a brake passes through it on
+/// its way to the denormal numbers, where no relative measure holds.
+inline constexpr double kNothing = 1e-120;
+
 inline double norm1(const lie::Vec3<double>& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
 /// Bounds of the angular and linear parts of a composite momentum, gathered from the tip as the momentum is.
