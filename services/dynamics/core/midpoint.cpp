@@ -18,6 +18,7 @@ double norm1(const lie::Vec3<double>& v) { return std::abs(v.x) + std::abs(v.y) 
 MidpointStep::MidpointStep(const rbd::AxisChain& chain, const Options& options)
     : chain_(chain),
       options_(options),
+      history_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
       p_next_(d_),
@@ -40,7 +41,7 @@ void MidpointStep::begin(const Node& from, const VectorXd& tau, double h) noexce
 
 StepReport MidpointStep::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
   begin(from, tau, h);
-  IncrementHistory::guess(from, h, d_);
+  history_.guess(from, h, d_);
   if (options_.root == Root::feedback) choose_factorisation(d_);
   if (options_.start == Start::previous) d_.setZero();
   StepReport report = find_root(*this, options_, d_);
