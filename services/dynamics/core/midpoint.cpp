@@ -19,6 +19,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 MidpointStep::MidpointStep(const rbd::AxisChain& chain, const Options& options)
     : chain_(chain),
       options_(options),
+      history_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
       p_next_(d_),
@@ -41,7 +42,7 @@ void MidpointStep::begin(const Node& from, const VectorXd& tau, double h) noexce
 
 StepReport MidpointStep::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
   begin(from, tau, h);
-  IncrementHistory::guess(from, h, d_);
+  history_.guess(from, h, d_);
   if (options_.root == Root::feedback) choose_factorisation(d_);
   if (options_.start == Start::previous) d_.setZero();
   StepReport report = find_root(*this, options_, d_);

@@ -22,6 +22,7 @@ class MidpointStep final : public TierStep {
  public:
   MidpointStep(const rbd::AxisChain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
+  double turn_bound() const noexcept override { return kTurnBound; }
   StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
 
   /// The step that evaluate() and correct() are about.
@@ -44,6 +45,7 @@ class MidpointStep final : public TierStep {
 
   const rbd::AxisChain& chain_;
   const Options options_;
+  IncrementHistory history_;
   // the step being solved
   const Node* from_ = nullptr;
   const VectorXd* tau_ = nullptr;

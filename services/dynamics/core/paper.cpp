@@ -13,6 +13,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 PaperStep::PaperStep(const rbd::AxisChain& chain, const Options& options)
     : chain_(chain),
       options_(options),
+      history_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
       p_(d_),
@@ -23,7 +24,7 @@ PaperStep::PaperStep(const rbd::AxisChain& chain, const Options& options)
 
 StepReport PaperStep::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
   from_ = &from, tau_ = &tau, h_ = h;
-  IncrementHistory::guess(from, h, d_);
+  history_.guess(from, h, d_);
   if (options_.start == Start::previous) d_.setZero();
   StepReport report = find_root(*this, options_, d_);
   if (!report.usable()) return report;

@@ -22,6 +22,7 @@ class PaperStep final : public TierStep {
  public:
   PaperStep(const rbd::AxisChain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
+  double turn_bound() const noexcept override { return kTurnBound; }
   StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
 
   Residual evaluate(const VectorXd& d) noexcept;
@@ -34,6 +35,7 @@ class PaperStep final : public TierStep {
 
   const rbd::AxisChain& chain_;
   const Options options_;
+  IncrementHistory history_;
   const Node* from_ = nullptr;
   const VectorXd* tau_ = nullptr;
   double h_ = 0;
