@@ -147,6 +147,12 @@ inline Mat3<Prod<A, B>> rotate(const Mat3<A>& R, const Mat3<B>& H) {
           R.x.z * T.x + R.y.z * T.y + R.z.z * T.z};
 }
 
+/// hat(a).
+inline Mat3<double> hat3(const Vec3<double>& a) { return {{0, a.z, -a.y}, {-a.z, 0, a.x}, {a.y, -a.x, 0}}; }
+inline Mat3<double> full(const Sym3<double>& M) {
+  return {{M.xx, M.xy, M.xz}, {M.xy, M.yy, M.yz}, {M.xz, M.yz, M.zz}};
+}
+
 inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }
 inline Mat3<double> mat3(const Eigen::Matrix3d& M) {
   return {vec3(M.col(0)), vec3(M.col(1)), vec3(M.col(2))};

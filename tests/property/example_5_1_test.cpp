@@ -69,6 +69,13 @@ TEST(Example51, LiteralTierIsOfFirstOrder) {
   EXPECT_NEAR(std::log2(error(0.01) / error(0.005)), 1, 0.05);
 }
 
+TEST(Example51, GaussReachesTheReferenceByLongSteps) {
+  const Fall run = simulate({.tier = Tier::gauss, .dt_s = 0.4, .stages = 6});
+  EXPECT_LT(run.joint_error, 2e-8);  // the reference has eight digits
+  EXPECT_LT(run.energy_error, 1e-10);
+  EXPECT_LT(run.evaluations, 18000);
+}
+
 TEST(Example51, RungeKuttaIsTheHonestRival) {
   const Fall run = simulate({.tier = Tier::rk4, .dt_s = 0.01});
   EXPECT_LT(run.joint_error, 1e-7);

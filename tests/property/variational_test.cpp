@@ -57,13 +57,40 @@ INSTANTIATE_TEST_SUITE_P(Property, Variational, testing::Range(0u, 20u));
 
 /// What must be symplectic: tiers and sizes of step.
 const Options kSymplectic[] = {{.tier = Tier::midpoint, .dt_s = 0.01},
-                               {.tier = Tier::midpoint, .dt_s = 0.001}};
+                               {.tier = Tier::midpoint, .dt_s = 0.001},
+                               {.tier = Tier::midpoint, .dt_s = 0.01, .root = Root::newton},
+                               {.tier = Tier::gauss, .dt_s = 0.01, .stages = 1},
+                               {.tier = Tier::gauss, .dt_s = 0.02, .stages = 2},
+                               {.tier = Tier::gauss, .dt_s = 0.02, .stages = 3},
+                               {.tier = Tier::gauss, .dt_s = 0.04, .stages = 4},
+                               {.tier = Tier::gauss, .dt_s = 0.04, .stages = 5},
+                               {.tier = Tier::gauss, .dt_s = 0.04, .stages = 6},
+                               {.tier = Tier::gauss, .dt_s = 0.04, .stages = 7},
+                               {.tier = Tier::gauss, .dt_s = 0.04, .stages = 8}};
 
 TEST_P(Variational, StepIsSymplectic) {
   const model::Chain chain = test::random_chain(rng, n, {.mass_spread = 0.3});
   const VectorXd q = rng.vector(n, 3), p = rng.vector(n, 0.5);
   for (const Options& options : kSymplectic)
     EXPECT_LT(symplectic_defect(chain, options, q, p), 2e-9) << options.dt_s;
+}
+
+// One Gauss point is the midpoint rule.
+TEST_P(Variational, GaussOfOneStageIsMidpoint) {
+  const model::Chain chain = test::random_chain(rng, n, {.damping = 0.5, .mass_spread = 0.3});
+  const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 1), tau = rng.vector(n, 1);
+  Integrator one(chain, {.tier = Tier::midpoint, .dt_s = 5e-3}),
+      other(chain, {.tier = Tier::gauss, .dt_s = 5e-3, .stages = 1});
+  State a = one.start(q, qd), b = other.start(q, qd);
+  double work = 0;
+  for (int k = 0; k < 20; ++k) {
+    const StepReport ra = one.step(a, tau), rb = other.step(b, tau);
+    ASSERT_TRUE(ra.usable() && rb.usable());
+    work += std::abs(ra.work_J);
+    EXPECT_NEAR(ra.work_J, rb.work_J, 1e-12 * (1 + work));
+  }
+  EXPECT_LT((a.q - b.q).norm(), 1e-11 * (1 + a.q.norm()));
+  EXPECT_LT((a.p - b.p).norm(), 1e-11 * (1 + a.p.norm()));
 }
 
 TEST(Symplectic, TestSeesTheDefectOfThePapersTier) {
@@ -75,27 +102,30 @@ TEST(Symplectic, TestSeesTheDefectOfThePapersTier) {
 
 TEST_P(Variational, TimeRunsBackToTheStart) {
   const model::Chain chain = test::random_chain(rng, n, {.mass_spread = 0.3});
-  const Options options{.dt_s = 1e-3};
-  Integrator integrator(chain, options);
-  State s = integrator.start(rng.vector(n, 3), rng.vector(n, 1));
-  const State begin = s;
-  const VectorXd tau = rng.vector(n, 1);
-  for (int k = 0; k < 200; ++k) ASSERT_TRUE(integrator.step(s, tau).usable());
-  s.p = -s.p;
-  s.history.assign(s.history.size(), 0);
-  for (int k = 0; k < 200; ++k) ASSERT_TRUE(integrator.step(s, tau).usable());
-  EXPECT_LT((s.q - begin.q).norm(), 1e-9 * (1 + begin.q.norm()));
-  EXPECT_LT((s.p + begin.p).norm(), 1e-9 * (1 + begin.p.norm()));
+  for (const Tier tier : {Tier::midpoint, Tier::gauss}) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = tier == Tier::gauss ? 5e-3 : 1e-3});
+    State s = integrator.start(rng.vector(n, 3), rng.vector(n, 1));
+    const State begin = s;
+    const VectorXd tau = rng.vector(n, 1);
+    for (int k = 0; k < 200; ++k) ASSERT_TRUE(integrator.step(s, tau).usable());
+    s.p = -s.p;
+    s.history.assign(s.history.size(), 0);
+    for (int k = 0; k < 200; ++k) ASSERT_TRUE(integrator.step(s, tau).usable());
+    EXPECT_LT((s.q - begin.q).norm(), 1e-8 * (1 + begin.q.norm())) << test::name(tier);
+    EXPECT_LT((s.p + begin.p).norm(), 1e-8 * (1 + begin.p.norm())) << test::name(tier);
+  }
 }
 
 // Turning the whole arm about joint 1 changes nothing when there is no gravity: its momentum stays.
 TEST_P(Variational, MomentumAboutTheFirstAxisStaysWithoutGravity) {
   const model::Chain chain = test::random_chain(rng, n, {.gravity = false});
-  Integrator integrator(chain, {.dt_s = 2e-3});
-  State s = integrator.start(rng.vector(n, 3), rng.vector(n, 2));
-  const double p0 = s.p[0], scale = s.p.cwiseAbs().maxCoeff();
-  for (int k = 0; k < 2000; ++k) ASSERT_TRUE(integrator.step(s, VectorXd::Zero(n)).usable());
-  EXPECT_LT(std::abs(s.p[0] - p0), 2000 * 2e-15 * (scale + std::abs(p0)));
+  for (const Tier tier : {Tier::midpoint, Tier::gauss}) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = 2e-3});
+    State s = integrator.start(rng.vector(n, 3), rng.vector(n, 2));
+    const double p0 = s.p[0], scale = s.p.cwiseAbs().maxCoeff();
+    for (int k = 0; k < 2000; ++k) ASSERT_TRUE(integrator.step(s, VectorXd::Zero(n)).usable());
+    EXPECT_LT(std::abs(s.p[0] - p0), 2000 * 2e-15 * (scale + std::abs(p0))) << test::name(tier);
+  }
 }
 
 /// The state after `time_s`, by steps of dt.
@@ -120,7 +150,10 @@ const Order kOrders[] = {{{.tier = Tier::midpoint}, 2, 400},
                          {{.tier = Tier::hamel, .alpha = 0}, 1, 3200},
                          {{.tier = Tier::hamel, .alpha = 1}, 1, 3200},
                          {{.tier = Tier::semi_implicit_euler}, 1, 3200},
-                         {{.tier = Tier::rk4}, 4, 100}};
+                         {{.tier = Tier::rk4}, 4, 100},
+                         {{.tier = Tier::gauss, .stages = 1}, 2, 400},
+                         {{.tier = Tier::gauss, .stages = 2}, 4, 20},
+                         {{.tier = Tier::gauss, .stages = 3}, 6, 5}};
 
 // With torque, damping and armature: forces must not cost the order.
 TEST_P(Variational, OrderShowsInRichardsonSlopes) {
@@ -145,7 +178,7 @@ TEST_P(Variational, TiersAgreeOnTheMotion) {
 
 TEST_P(Variational, WorkIsTheChangeOfEnergy) {
   const model::Chain chain = test::random_chain(rng, n, {.armature = 1, .damping = 1, .mass_spread = 0.3});
-  for (const Tier tier : {Tier::midpoint, Tier::rk4}) {
+  for (const Tier tier : {Tier::midpoint, Tier::rk4, Tier::gauss}) {
     Integrator integrator(chain, {.tier = tier, .dt_s = 1e-4});
     State s = integrator.start(rng.vector(n, 3), rng.vector(n, 1));
     const VectorXd tau = rng.vector(n, 1);

@@ -15,36 +15,38 @@ namespace hamel::dynamics {
 /// They serve only steps of the same length h.
 class IncrementHistory {
  public:
-  static constexpr int kDepth = 4;
+  static constexpr int kDepth = 7;
   static std::size_t size(int n) noexcept { return 2 + static_cast<std::size_t>(kDepth * n); }
 
-  /// First guess of d: the polynomial through the last increments; h qd while there are none.
-  static void guess(const Node& from, double h, VectorXd& d) noexcept {
-    const auto& s = from.history;
-    const Eigen::Index n = d.size();
-    const int count = s[1] == h ? static_cast<int>(s[0]) : 0;
-    const auto past = [&](int k) { return Eigen::Map<const VectorXd>(s.data() + 2 + k * n, n); };
-    switch (count) {
-      case 0:
-        d = h * from.qd;
-        break;
-      case 1:
-        d = 2 * h * from.qd - past(0);
-        break;  // qd is between the two increments
-      case 2:
-        d = 2 * past(0) - past(1);
-        break;
-      case 3:
-        d = 3 * past(0) - 3 * past(1) + past(2);
-        break;
-      default:
-        d = 4 * past(0) - 6 * past(1) + 4 * past(2) - past(3);
+  explicit IncrementHistory(int n) : difference_(Eigen::MatrixXd::Zero(n, kDepth)) {}
+
+  /// First guess of d: h qd while there is no past, else the polynomial through the last increments as a sum
+  /// of backward differences, cut off where they stop falling: smooth motion gets a high order, rough motion
+  /// a low one.
+  void guess(const Node& from, double h, VectorXd& d) noexcept {
+    const std::vector<double>& s = from.history;
+    const Eigen::Index n = d.size(), count = s[1] == h ? static_cast<Eigen::Index>(s[0]) : 0;
+    d = h * from.qd;
+    if (count == 0) return;
+    difference_.leftCols(count) = Eigen::Map<const Eigen::MatrixXd>(s.data() + 2, n, count);
+    if (count == 1) {
+      d = 2 * d - difference_.col(0);  // h qd lies between the two increments
+      return;
+    }
+    d = difference_.col(0);
+    double before = d.lpNorm<1>();
+    for (Eigen::Index order = 1; order < count; ++order) {
+      for (Eigen::Index k = 0; k + order < count; ++k) difference_.col(k) -= difference_.col(k + 1);
+      const double size = difference_.col(0).lpNorm<1>();
+      if (size >= 0.5 * before) return;
+      d += difference_.col(0);
+      before = size;
     }
   }
 
   /// Puts d in front of from's history and writes it to `to`.
   static void push(const Node& from, double h, const VectorXd& d, Node& to) noexcept {
-    const auto& s = from.history;
+    const std::vector<double>& s = from.history;
     const Eigen::Index n = d.size();
     const double count = s[1] == h ? s[0] : 0;
     to.history[0] = std::min<double>(count + 1, kDepth);
@@ -52,7 +54,13 @@ class IncrementHistory {
     std::copy(s.begin() + 2, s.end() - n, to.history.begin() + 2 + n);
     Eigen::Map<VectorXd>(to.history.data() + 2, n) = d;
   }
+
+ private:
+  Eigen::MatrixXd difference_;
 };
+
+/// Turn bound of the tiers that find increments [rad].
+inline constexpr double kTurnBound = 1.0;
 
 /// Residual of one evaluation.
 struct Residual {
@@ -70,15 +78,15 @@ inline constexpr int kPatience = 3;
 /// Growth over the first residual that means divergence.
 inline constexpr double kGrowth = 1e6;
 
-/// Updates d until the equation holds.  Equation: Residual evaluate(d), void correct(d) (d -= J^-1 r).
-/// The last call to evaluate() is at the d that is returned.
-template <class Equation>
-StepReport find_root(Equation& equation, const Options& options, VectorXd& d) noexcept {
+/// Updates the unknown until the equation holds.  Equation: Residual evaluate(x), void correct(x) (x -= J^-1
+/// r). The last call to evaluate() is at the x that is returned.
+template <class Equation, class Unknown>
+StepReport find_root(Equation& equation, const Options& options, Unknown& x) noexcept {
   StepReport report;
   double first = 0, best = std::numeric_limits<double>::infinity();
   int since_best = 0;
   for (;;) {
-    const Residual r = equation.evaluate(d);
+    const Residual r = equation.evaluate(x);
     ++report.evaluations;
     report.residual_Nm = r.torque_Nm;
     if (!std::isfinite(r.torque_Nm) || !std::isfinite(r.relative)) return report;
@@ -99,7 +107,7 @@ StepReport find_root(Equation& equation, const Options& options, VectorXd& d) no
       return report;
     }
     best = std::min(best, r.relative);
-    equation.correct(d);
+    equation.correct(x);
     ++report.iterations;
   }
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/rbd/rbd.h"
+#include "services/dynamics/core/gauss.h"
 #include "services/dynamics/core/midpoint.h"
 #include "services/dynamics/core/paper.h"
 #include "services/dynamics/core/rivals.h"
@@ -13,11 +14,8 @@
 namespace hamel::dynamics {
 namespace {
 
-/// A joint may turn this much further in one undivided step than its velocity says; beyond it the root is
-/// spurious or the step too long for the motion [rad].
-constexpr double kTurnBound = 1.0;
 /// Energy that one undivided step may gain or lose beyond the work done, as a share of the energy in play.
-constexpr double kEnergyBound = 0.5;
+constexpr double kEnergyBound = 0.1;
 
 std::unique_ptr<TierStep> make_tier(const model::Chain& chain, const rbd::AxisChain& axis,
                                     const Options& options) {
@@ -28,8 +26,9 @@ std::unique_ptr<TierStep> make_tier(const model::Chain& chain, const rbd::AxisCh
       return std::make_unique<Rk4Step>(chain, axis, options);
     case Tier::semi_implicit_euler:
       return std::make_unique<SemiImplicitEulerStep>(chain, axis, options);
-    case Tier::midpoint:
     case Tier::gauss:
+      return std::make_unique<GaussStep>(axis, options);
+    case Tier::midpoint:
     case Tier::dopri8:
       break;
   }
@@ -103,7 +102,7 @@ bool Integrator::Impl::sane(const StepReport& report, const VectorXd& tau, doubl
   double work = std::abs(report.work_J);
   for (int i = 0; i < axis.n(); ++i) {
     const double d = next.q[i] - now.q[i];
-    if (!axis[i].prismatic && std::abs(d - h * now.qd[i]) > kTurnBound) return false;
+    if (!axis[i].prismatic && std::abs(d - h * now.qd[i]) > tier->turn_bound()) return false;
     work += std::abs(tau[i] * d);
   }
   const double in_play = now.energy_J - now.potential_J + work + axis.energy_scale;
@@ -129,14 +128,18 @@ StepReport Integrator::Impl::march(const VectorXd& tau) noexcept {
     const StepReport r = advance(tau, h);
     total.iterations += r.iterations;
     total.evaluations += r.evaluations;
-    total.residual_Nm = r.usable() ? std::max(total.residual_Nm, r.residual_Nm) : r.residual_Nm;
     if (!r.usable()) {
       total.stop = r.stop;
-      if (part == 1) return total;
+      if (part == 1) {
+        total.residual_Nm = r.residual_Nm;
+        return total;
+      }
       part /= 2;
       continue;
     }
+    total.residual_Nm = std::max(total.residual_Nm, r.residual_Nm);
     total.work_J += r.work_J;
+    total.energy_error_J += next.energy_J - now.energy_J - r.work_J;
     // stagnation in one part is told of the whole
     total.stop = total.substeps > 0 && total.stop == Stop::stagnated ? Stop::stagnated : r.stop;
     ++total.substeps;

@@ -26,6 +26,7 @@ struct [[nodiscard]] StepReport {
   int substeps = 1;              ///< parts the step was divided into
   double residual_Nm = 0;        ///< largest torque left unbalanced
   double work_J = 0;             ///< of joint torques, damping and stops over the step, as applied
+  double energy_error_J = 0;     ///< change of E(q, p) beyond that work: what the method made up
   bool usable() const noexcept { return stop != Stop::diverged && stop != Stop::budget_spent; }
 };
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/dynamics/core/increment_root.h"
+#include "services/dynamics/core/newton.h"
 #include "services/dynamics/core/tier.h"
 
 namespace hamel::dynamics {
@@ -21,21 +22,30 @@ class MidpointStep final : public TierStep {
  public:
   MidpointStep(const rbd::AxisChain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
+  double turn_bound() const noexcept override { return kTurnBound; }
   StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
 
-  /// Residual p^-(d) - p_k - (h/2) F.  Prepares correct() and momentum_after().
+  /// The step that evaluate() and correct() are about.
+  void begin(const Node& from, const VectorXd& tau, double h) noexcept;
+  /// Residual p^-(d) - p_k - (h/2) F.
   Residual evaluate(const VectorXd& d) noexcept;
+  const VectorXd& residual() const noexcept { return r_; }
   /// d <- d - J^-1 r: Eq. (16) with M^-1 by the factorisation, or Newton.
   void correct(VectorXd& d) noexcept;
+  /// Exact Jacobian at the last evaluate(), and x with J x = r.
+  void linearise(const VectorXd& d) noexcept;
+  void solve_linear(const VectorXd& r, VectorXd& x) noexcept { newton_.solve(r.data(), x.data()); }
 
  private:
   void choose_factorisation(const VectorXd& d) noexcept;
   void forward(const VectorXd& d) noexcept;
   Residual backward(const VectorXd& d) noexcept;
+  JointRow row(int i, double d) const noexcept;
   double force(int i, double d) const noexcept;
 
   const rbd::AxisChain& chain_;
   const Options options_;
+  IncrementHistory history_;
   // the step being solved
   const Node* from_ = nullptr;
   const VectorXd* tau_ = nullptr;
@@ -46,8 +56,12 @@ class MidpointStep final : public TierStep {
   VectorXd d_, r_, p_next_, extra_, u_;
   LinkPoses X_, X_factor_;
   JointFactors own_factor_;
-  std::vector<rbd::Half6<double>> V_, momentum_;
-  std::vector<rbd::Vec3<double>> g_;
+  std::vector<rbd::Half6<double>> V_, momentum_, H_;
+  std::vector<rbd::Vec3<double>> g_, moment_;
+  // Newton: the factorisation serves while it converges fast
+  ChainNewton newton_;
+  double relative_ = 0, relative_at_correction_ = 0;
+  bool linearised_ = false;
 };
 
 }  // namespace hamel::dynamics

@@ -11,16 +11,18 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 PaperStep::PaperStep(const rbd::AxisChain& chain, const Options& options)
     : chain_(chain),
       options_(options),
+      history_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
       p_(d_),
       u_(d_),
       V_(at(chain.n())),
-      momentum_(at(chain.n())) {}
+      momentum_(at(chain.n())),
+      newton_(chain) {}
 
 StepReport PaperStep::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
   from_ = &from, tau_ = &tau, h_ = h;
-  IncrementHistory::guess(from, h, d_);
+  history_.guess(from, h, d_);
   if (options_.start == Start::previous) d_.setZero();
   StepReport report = find_root(*this, options_, d_);
   if (!report.usable()) return report;
@@ -81,8 +83,41 @@ Residual PaperStep::evaluate(const VectorXd& d) noexcept {
   return worst;
 }
 
-/// Eq. (16): q^{k+1} <- q^{k+1} - h^2 M(q^k)^-1 tau_e.
+/// With X at q^k the twists alone depend on d: the change of a link's momentum is
+///   (I - (1 - alpha) h (ad_V^T I + d/dV ad_V^T (I V fixed))) (change of V).
+void PaperStep::linearise() noexcept {
+  const double s = (1 - options_.alpha) * h_;
+  for (int i = 0; i < chain_.n(); ++i) {
+    const rbd::AxisLink& k = chain_[i];
+    const rbd::Half6<double>& V = V_[at(i)];
+    const rbd::Half6<double> IV = momentum(k, V);
+    JointRow& j = newton_.rows()[at(i)];
+    j = {};
+    for (int c = 0; c < 6; ++c) {
+      rbd::Half6<double> unit;
+      double* const part[] = {&unit.a.x, &unit.a.y, &unit.a.z, &unit.l.x, &unit.l.y, &unit.l.z};
+      *part[c] = 1;
+      const rbd::Half6<double> I_unit = momentum(k, unit);
+      const rbd::Half6<double> column = I_unit - s * (coadjoint(V, I_unit) + coadjoint(unit, IV));
+      lie::Mat3<double>&top = j.K[0][c / 3], &bottom = j.K[1][c / 3];
+      (c % 3 == 0 ? top.x : c % 3 == 1 ? top.y : top.z) = column.a;
+      (c % 3 == 0 ? bottom.x : c % 3 == 1 ? bottom.y : bottom.z) = column.l;
+    }
+    along(k, j.l.h) = 1;
+    along(k, j.b.h) = 1 / h_;
+    j.c = k.armature / h_ + 0.5 * k.damping;
+  }
+  newton_.factorise(from_->X);
+}
+
+/// Eq. (16): q^{k+1} <- q^{k+1} - h^2 M(q^k)^-1 tau_e, or Newton.
 void PaperStep::correct(VectorXd& d) noexcept {
+  if (options_.root == Root::newton) {
+    linearise();
+    newton_.solve(r_.data(), r_.data());
+    d -= r_;
+    return;
+  }
   rbd::solve(chain_, from_->X.data(), from_->factor.data(), r_.data(), u_.data(), r_.data());
   d -= h_ * r_;
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/dynamics/core/increment_root.h"
+#include "services/dynamics/core/newton.h"
 #include "services/dynamics/core/tier.h"
 
 namespace hamel::dynamics {
@@ -21,22 +22,26 @@ class PaperStep final : public TierStep {
  public:
   PaperStep(const rbd::AxisChain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
+  double turn_bound() const noexcept override { return kTurnBound; }
   StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
 
   Residual evaluate(const VectorXd& d) noexcept;
   void correct(VectorXd& d) noexcept;
 
  private:
+  void linearise() noexcept;
   double force(int i, double d) const noexcept;
   void gather(const Node& node, double share, double sign, VectorXd& p) noexcept;
 
   const rbd::AxisChain& chain_;
   const Options options_;
+  IncrementHistory history_;
   const Node* from_ = nullptr;
   const VectorXd* tau_ = nullptr;
   double h_ = 0;
   VectorXd d_, r_, p_, u_;
   std::vector<rbd::Half6<double>> V_, momentum_;
+  ChainNewton newton_;
 };
 
 }  // namespace hamel::dynamics

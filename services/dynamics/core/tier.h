@@ -2,6 +2,7 @@
 /// What every tier of the dial offers the integrator.
 
 #include <Eigen/Core>
+#include <limits>
 
 #include "services/dynamics/core/integrator.h"
 #include "services/dynamics/core/node.h"
@@ -16,6 +17,9 @@ class TierStep {
   virtual std::size_t history_size() const noexcept = 0;
   /// Which of p and qd the tier integrates: the other follows.
   virtual bool integrates_velocity() const noexcept { return false; }
+  /// A revolute joint may turn this much further in one undivided step than its velocity says: beyond it a
+  /// low-order step is too long for the motion or its root is spurious [rad].
+  virtual double turn_bound() const noexcept { return std::numeric_limits<double>::infinity(); }
   /// One undivided step of h seconds, `from` to `to`, history included.  `to` means nothing when not
   /// usable().
   virtual StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept = 0;
