@@ -49,6 +49,7 @@ struct Memory {
   double fast_s = 0;        ///< when the arm last moved faster than `goal_speed`
   double turn_error = 0;    ///< scaled error the flip timer compares with
   double turn_s = 0;        ///< when the flip timer started
+  double pressed_s = -std::numeric_limits<double>::infinity();  ///< when the attraction last pressed on something
   std::uint64_t flips = 0;  ///< since the last progress
   double infeasible_s = -std::numeric_limits<double>::infinity();  ///< when the barrier last gave up
   double ramp_start_s = -1;                                        ///< < 0: no ramp

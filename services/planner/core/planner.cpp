@@ -250,7 +250,9 @@ void Planner::Impl::circulate(double t_s, VectorXd& tau) noexcept {
   const double fade = std::clamp((t_s - memory.infeasible_s) / kFade_s, 0.0, 1.0);
   const bool pressed = gyro.add_circulation(pairs, memory, t_s, fade * options.kc, qdd_att, tau);
   const double error = attraction.error().scaled;
-  if (!pressed || error < 0.9 * memory.turn_error || memory.turn_error == 0) {
+  if (pressed) memory.pressed_s = t_s;
+  const bool clear = t_s - memory.pressed_s > kTurnHold_s;
+  if (clear || error < 0.9 * memory.turn_error || memory.turn_error == 0) {
     memory.turn_error = error;
     memory.turn_s = t_s;
   } else if (t_s - memory.turn_s >= options.flip_time_s) {
