@@ -7,9 +7,11 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -22,20 +24,25 @@ const char* to_string(Vendor v);
 
 using Payload = std::vector<std::byte>;
 
+inline constexpr std::uint32_t kMaxDomain = 232;  ///< RTPS ports are 7400 + 250 * domain and up
+
 struct NodeOptions {
   Vendor vendor = Vendor::inproc;
-  std::uint32_t domain = 31;               ///< DDS domain, 0..232; inproc: a name space within the process
-  std::string interface_name;              ///< network interface or address; empty: loopback only
-  std::vector<std::string> peers;          ///< unicast addresses; empty: multicast where the interface has it
-  std::string name = "hamel";              ///< shown by tools
+  std::uint32_t domain = 31;       ///< DDS domain, 0..232; inproc: a name space within the process
+  std::string interface_name;      ///< network interface or address; empty: loopback only
+  std::vector<std::string> peers;  ///< unicast addresses; empty: multicast where the interface has it
+  std::string name = "hamel";      ///< shown by tools
+  /// Told in one sentence what a user should know (a peer's QoS that cannot match ours), each once.  Called
+  /// on any thread, never while a sample waits; empty: nobody is told.
+  std::function<void(const std::string&)> log;
 };
 
 /// What happened to one end of a topic since it was made.
 struct Counters {
-  std::uint64_t samples = 0;               ///< written or taken
-  std::uint64_t lost = 0;                  ///< the bus says it dropped these
-  std::uint64_t refused = 0;               ///< larger than Topic::max_bytes, or an unknown encapsulation
-  std::uint64_t incompatible = 0;          ///< peers whose QoS cannot match ours (each also logged once)
+  std::uint64_t samples = 0;       ///< written or taken
+  std::uint64_t lost = 0;          ///< the bus says it dropped these
+  std::uint64_t refused = 0;       ///< larger than Topic::max_bytes, or an unknown encapsulation
+  std::uint64_t incompatible = 0;  ///< peers whose QoS cannot match ours (each also logged once)
 };
 
 class Writer {
@@ -43,16 +50,17 @@ class Writer {
   virtual ~Writer() = default;
   /// Sends a payload.  False when the bus refused it (counted).  Never waits for a reader.
   virtual bool write(std::span<const std::byte> payload) = 0;
-  virtual int matched() const = 0;         ///< readers known now
+  virtual int matched() const = 0;  ///< readers known now
   virtual Counters counters() const = 0;
 };
 
 class Reader {
  public:
   virtual ~Reader() = default;
-  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits.
+  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits. Samples
+  /// of one writer and key come in the order they were written; between keys DDS promises no order.
   virtual bool take(Payload& payload) = 0;
-  virtual int matched() const = 0;         ///< writers known now
+  virtual int matched() const = 0;  ///< writers known now
   virtual Counters counters() const = 0;
 };
 
@@ -61,6 +69,7 @@ class Reader {
 class Node {
  public:
   virtual ~Node() = default;
+  /// Never null; std::runtime_error with one sentence when the vendor refuses (out of memory or sockets).
   virtual std::unique_ptr<Writer> writer(const Topic& topic) = 0;
   virtual std::unique_ptr<Reader> reader(const Topic& topic) = 0;
   /// Waits until a sample arrived or wake() was called since the last wait(), or until the deadline.
@@ -70,8 +79,8 @@ class Node {
   virtual const NodeOptions& options() const = 0;
 };
 
-/// Opens a node, or says in one sentence what is wrong: interface absent or down, domain out of range, no free
-/// participant index, vendor's own refusal.
+/// Opens a node, or says in one sentence what is wrong: interface absent or down, domain out of range, no
+/// free participant index, vendor's own refusal.
 Result<std::unique_ptr<Node>, Problem> open(const NodeOptions& options);
 
 /// "fastdds" -> Vendor; the error lists the names.

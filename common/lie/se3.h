@@ -1,5 +1,6 @@
 #pragma once
-/// Rigid motions.  Twists are (omega, v), wrenches (torque, force): angular first, body frame unless named otherwise.
+/// Rigid motions.  Twists are (omega, v), wrenches (torque, force): angular first, body frame unless named
+/// otherwise.
 
 #include <Eigen/Core>
 
@@ -75,9 +76,7 @@ inline Matrix6 ad(const Twist& x) {
 }
 
 /// X = exp(hat(x)), x = (phi, rho).
-inline Pose exp_se3(const Twist& x) {
-  return {exp_so3(x.head<3>()), dexp_so3(x.head<3>()) * x.tail<3>()};
-}
+inline Pose exp_se3(const Twist& x) { return {exp_so3(x.head<3>()), dexp_so3(x.head<3>()) * x.tail<3>()}; }
 /// x with exp_se3(x) = X and rotation angle <= pi.
 inline Twist log_se3(const Pose& X) {
   Twist x;
@@ -94,7 +93,8 @@ inline Eigen::Matrix3d dexp_coupling(const Twist& x) {
   return 0.5 * P + sinc3(t2) * (WP + PW + WPW) + cosc4(t2) * (W * WP + PW * W - 3 * WPW) +
          0.5 * (cosc4(t2) - 3 * sinc5(t2)) * (WPW * W + W * WPW);
 }
-/// d/dt exp(x(t)) = hat(dexp(x) xdot) exp(x), dexp(x) = sum ad_x^k / (k+1)!; body twists use dexp(-x).  Eq. (2).
+/// d/dt exp(x(t)) = hat(dexp(x) xdot) exp(x), dexp(x) = sum ad_x^k / (k+1)!; body twists use dexp(-x).  Eq.
+/// (2).
 inline Matrix6 dexp_se3(const Twist& x) {
   const Eigen::Matrix3d J = dexp_so3(x.head<3>());
   Matrix6 A;

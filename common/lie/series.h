@@ -1,8 +1,9 @@
 #pragma once
 /// The removable singularities of rotation formulas, all in one home.
 ///
-/// Each function takes x = theta^2 >= 0 and is analytic at 0.  Below kSwitch a power series is summed, above it the
-/// closed form in half angles; against 40-digit values both stay within 4 eps (tests/property/series_test.cpp).
+/// Each function takes x = theta^2 >= 0 and is analytic at 0.  Below kSwitch a power series is summed, above
+/// it the closed form in half angles.  Relative error against long double over 0.1..5: at most 8 eps for the
+/// sines and cosines, 20 eps for cotc just above the switch (tests/property/lie_test.cpp).
 
 #include <array>
 #include <cmath>

@@ -24,7 +24,8 @@ inline Eigen::Matrix3d exp_so3(const Eigen::Vector3d& phi) {
   return Eigen::Matrix3d::Identity() + sinc(x) * W + cosc(x) * (W * W);
 }
 
-/// Unit quaternion (w, x, y, z) of R with w >= 0: the largest component first, so nothing cancels [Shepperd 1978].
+/// Unit quaternion (w, x, y, z) of R with w >= 0: the largest component first, so nothing cancels [Shepperd
+/// 1978].
 inline Eigen::Vector4d quaternion_wxyz(const Eigen::Matrix3d& R) {
   const double t = R.trace();
   Eigen::Vector4d q;

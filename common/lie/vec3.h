@@ -1,8 +1,9 @@
 #pragma once
-/// Three-vectors and 3 x 3 matrices of any scalar that has + - * /: a double, or a pack of doubles side by side.
+/// Three-vectors and 3 x 3 matrices of any scalar that has + - * /: a double, or a pack of doubles side by
+/// side.
 ///
-/// The recursions are written once over these.  Plain structs: everything inlines, nothing allocates.  Products of
-/// a constant of doubles and a variable of packs give packs.
+/// The recursions are written once over these.  Plain structs: everything inlines, nothing allocates.
+/// Products of a constant of doubles and a variable of packs give packs.
 
 #include <Eigen/Core>
 
@@ -27,18 +28,30 @@ template <class A, class B>
 using Prod = decltype(A{} * B{});
 
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator+(const Vec3<A>& a, const Vec3<B>& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec3<Prod<A, B>> operator+(const Vec3<A>& a, const Vec3<B>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator-(const Vec3<A>& a, const Vec3<B>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vec3<Prod<A, B>> operator-(const Vec3<A>& a, const Vec3<B>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator*(const A& s, const Vec3<B>& b) { return {s * b.x, s * b.y, s * b.z}; }
+inline Vec3<Prod<A, B>> operator*(const A& s, const Vec3<B>& b) {
+  return {s * b.x, s * b.y, s * b.z};
+}
 template <class S>
-inline Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) { return a = a + b; }
+inline Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) {
+  return a = a + b;
+}
 template <class S>
-inline Vec3<S>& operator-=(Vec3<S>& a, const Vec3<S>& b) { return a = a - b; }
+inline Vec3<S>& operator-=(Vec3<S>& a, const Vec3<S>& b) {
+  return a = a - b;
+}
 
 template <class A, class B>
-inline Prod<A, B> dot(const Vec3<A>& a, const Vec3<B>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Prod<A, B> dot(const Vec3<A>& a, const Vec3<B>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 template <class A, class B>
 inline Vec3<Prod<A, B>> cross(const Vec3<A>& a, const Vec3<B>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
@@ -60,17 +73,25 @@ inline Vec3<Prod<A, B>> operator*(const Sym3<A>& M, const Vec3<B>& b) {
           M.xz * b.x + M.yz * b.y + M.zz * b.z};
 }
 template <class A, class B>
-inline Mat3<Prod<A, B>> operator*(const Mat3<A>& M, const Mat3<B>& N) { return {M * N.x, M * N.y, M * N.z}; }
+inline Mat3<Prod<A, B>> operator*(const Mat3<A>& M, const Mat3<B>& N) {
+  return {M * N.x, M * N.y, M * N.z};
+}
 template <class S>
-inline Mat3<S> operator+(const Mat3<S>& M, const Mat3<S>& N) { return {M.x + N.x, M.y + N.y, M.z + N.z}; }
+inline Mat3<S> operator+(const Mat3<S>& M, const Mat3<S>& N) {
+  return {M.x + N.x, M.y + N.y, M.z + N.z};
+}
 template <class S>
 inline Sym3<S> operator+(const Sym3<S>& M, const Sym3<S>& N) {
   return {M.xx + N.xx, M.yy + N.yy, M.zz + N.zz, M.xy + N.xy, M.xz + N.xz, M.yz + N.yz};
 }
 template <class S>
-inline Sym3<S>& operator+=(Sym3<S>& M, const Sym3<S>& N) { return M = M + N; }
+inline Sym3<S>& operator+=(Sym3<S>& M, const Sym3<S>& N) {
+  return M = M + N;
+}
 template <class S>
-inline Mat3<S>& operator+=(Mat3<S>& M, const Mat3<S>& N) { return M = M + N; }
+inline Mat3<S>& operator+=(Mat3<S>& M, const Mat3<S>& N) {
+  return M = M + N;
+}
 template <class S>
 inline Mat3<S> transpose(const Mat3<S>& M) {
   return {{M.x.x, M.y.x, M.z.x}, {M.x.y, M.y.y, M.z.y}, {M.x.z, M.y.z, M.z.z}};
@@ -78,11 +99,14 @@ inline Mat3<S> transpose(const Mat3<S>& M) {
 
 /// hat(p) N: the columns p x n.
 template <class A, class B>
-inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Mat3<B>& N) { return {cross(p, N.x), cross(p, N.y), cross(p, N.z)}; }
+inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Mat3<B>& N) {
+  return {cross(p, N.x), cross(p, N.y), cross(p, N.z)};
+}
 /// hat(p) M.
 template <class A, class B>
 inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Sym3<B>& M) {
-  return {cross(p, Vec3<B>{M.xx, M.xy, M.xz}), cross(p, Vec3<B>{M.xy, M.yy, M.yz}), cross(p, Vec3<B>{M.xz, M.yz, M.zz})};
+  return {cross(p, Vec3<B>{M.xx, M.xy, M.xz}), cross(p, Vec3<B>{M.xy, M.yy, M.yz}),
+          cross(p, Vec3<B>{M.xz, M.yz, M.zz})};
 }
 /// W + W^T.
 template <class S>
@@ -93,7 +117,8 @@ inline Sym3<S> twice_symmetric(const Mat3<S>& W) {
 template <class S>
 inline Sym3<S> minus_outer(const Sym3<S>& M, const S& s, const Vec3<S>& a) {
   const Vec3<S> b = s * a;
-  return {M.xx - b.x * a.x, M.yy - b.y * a.y, M.zz - b.z * a.z, M.xy - b.x * a.y, M.xz - b.x * a.z, M.yz - b.y * a.z};
+  return {M.xx - b.x * a.x, M.yy - b.y * a.y, M.zz - b.z * a.z,
+          M.xy - b.x * a.y, M.xz - b.x * a.z, M.yz - b.y * a.z};
 }
 /// M - s a b^T.
 template <class S>
@@ -105,8 +130,11 @@ inline Mat3<S> minus_outer(const Mat3<S>& M, const S& s, const Vec3<S>& a, const
 template <class A, class B>
 inline Sym3<Prod<A, B>> rotate(const Mat3<A>& R, const Sym3<B>& M) {
   using S = Prod<A, B>;
-  const Vec3<S> tx = R * Vec3<B>{M.xx, M.xy, M.xz}, ty = R * Vec3<B>{M.xy, M.yy, M.yz}, tz = R * Vec3<B>{M.xz, M.yz, M.zz};
-  const auto at = [&](const S& a, const S& b, const S& c, const A& x, const A& y, const A& z) { return a * x + b * y + c * z; };
+  const Vec3<S> tx = R * Vec3<B>{M.xx, M.xy, M.xz}, ty = R * Vec3<B>{M.xy, M.yy, M.yz},
+                tz = R * Vec3<B>{M.xz, M.yz, M.zz};
+  const auto at = [&](const S& a, const S& b, const S& c, const A& x, const A& y, const A& z) {
+    return a * x + b * y + c * z;
+  };
   return {at(tx.x, ty.x, tz.x, R.x.x, R.y.x, R.z.x), at(tx.y, ty.y, tz.y, R.x.y, R.y.y, R.z.y),
           at(tx.z, ty.z, tz.z, R.x.z, R.y.z, R.z.z), at(tx.x, ty.x, tz.x, R.x.y, R.y.y, R.z.y),
           at(tx.x, ty.x, tz.x, R.x.z, R.y.z, R.z.z), at(tx.y, ty.y, tz.y, R.x.z, R.y.z, R.z.z)};
@@ -119,10 +147,23 @@ inline Mat3<Prod<A, B>> rotate(const Mat3<A>& R, const Mat3<B>& H) {
           R.x.z * T.x + R.y.z * T.y + R.z.z * T.z};
 }
 
+/// hat(a).
+inline Mat3<double> hat3(const Vec3<double>& a) { return {{0, a.z, -a.y}, {-a.z, 0, a.x}, {a.y, -a.x, 0}}; }
+inline Mat3<double> full(const Sym3<double>& M) {
+  return {{M.xx, M.xy, M.xz}, {M.xy, M.yy, M.yz}, {M.xz, M.yz, M.zz}};
+}
+
 inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }
-inline Mat3<double> mat3(const Eigen::Matrix3d& M) { return {vec3(M.col(0)), vec3(M.col(1)), vec3(M.col(2))}; }
+inline Mat3<double> mat3(const Eigen::Matrix3d& M) {
+  return {vec3(M.col(0)), vec3(M.col(1)), vec3(M.col(2))};
+}
 inline Sym3<double> sym3(const Eigen::Matrix3d& M) {
-  return {M(0, 0), M(1, 1), M(2, 2), 0.5 * (M(0, 1) + M(1, 0)), 0.5 * (M(0, 2) + M(2, 0)), 0.5 * (M(1, 2) + M(2, 1))};
+  return {M(0, 0),
+          M(1, 1),
+          M(2, 2),
+          0.5 * (M(0, 1) + M(1, 0)),
+          0.5 * (M(0, 2) + M(2, 0)),
+          0.5 * (M(1, 2) + M(2, 1))};
 }
 
 }  // namespace hamel::lie

@@ -10,7 +10,8 @@ namespace hamel::model {
 namespace {
 
 constexpr double kUnitTolerance = 1e-9;
-/// Slack of the triangle inequality, relative to the largest principal moment: flat bodies meet it with equality.
+/// Slack of the triangle inequality, relative to the largest principal moment: flat bodies meet it with
+/// equality.
 constexpr double kTriangleTolerance = 1e-6;
 
 /// Collects problems under one place name after another.
@@ -41,8 +42,9 @@ void check_pose(Check& check, const lie::Pose& X, const char* name) {
   check.finite(X.p, name);
   if (!check.finite(X.R, name)) return;
   const double error = (X.R.transpose() * X.R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  check.that(error <= kUnitTolerance && X.R.determinant() > 0, name,
-             "rotation is not orthonormal (error " + text(error) + ", determinant " + text(X.R.determinant()) + ")");
+  check.that(
+      error <= kUnitTolerance && X.R.determinant() > 0, name,
+      "rotation is not orthonormal (error " + text(error) + ", determinant " + text(X.R.determinant()) + ")");
 }
 
 void check_limits(Check& check, const JointLimits& l) {
@@ -66,11 +68,13 @@ void check_joint(Check& check, const Joint& j) {
   check.at_least_zero(j.armature, "armature");
 }
 
-/// A rotational inertia that a body can have: positive definite, no principal moment above the sum of the others.
+/// A rotational inertia that a body can have: positive definite, no principal moment above the sum of the
+/// others.
 void check_about_com(Check& check, const Eigen::Matrix3d& I) {
   check.that((I - I.transpose()).cwiseAbs().maxCoeff() <= kUnitTolerance * I.cwiseAbs().maxCoeff(),
              "inertia.about_com_kgm2", "is not symmetric");
-  const Eigen::Vector3d e = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d e =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I, Eigen::EigenvaluesOnly).eigenvalues();
   const std::string moments = "principal moments " + text(e[0]) + ", " + text(e[1]) + ", " + text(e[2]);
   check.that(e[0] > 0, "inertia.about_com_kgm2", "is not positive definite: " + moments);
   check.that(e[2] <= (e[0] + e[1]) + kTriangleTolerance * e[2], "inertia.about_com_kgm2",
@@ -93,8 +97,9 @@ Problems problems(const ChainSpec& spec) {
   Check check(out);
   check.at(spec.name.empty() ? "chain" : spec.name);
   check.that(!spec.joints.empty(), "joints", "are none, must be at least one");
-  check.that(spec.joints.size() == spec.links.size(), "links",
-             "are " + std::to_string(spec.links.size()) + " for " + std::to_string(spec.joints.size()) + " joints");
+  check.that(
+      spec.joints.size() == spec.links.size(), "links",
+      "are " + std::to_string(spec.links.size()) + " for " + std::to_string(spec.joints.size()) + " joints");
   check_pose(check, spec.X_WB0, "X_WB0");
   check_pose(check, spec.X_NE, "X_NE");
   check.finite(spec.gravity_W_mps2, "gravity_W_mps2");

@@ -1,10 +1,12 @@
 #include "common/rbd/axis_chain.h"
 
+#include <cmath>
+
 namespace hamel::rbd {
 namespace {
 
-/// A rotation whose third column is the unit vector `axis`; the identity where the axis is e_3 already, so that
-/// robots modelled about z keep their digits.
+/// A rotation whose third column is the unit vector `axis`; the identity where the axis is e_3 already, so
+/// that robots modelled about z keep their digits.
 Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {
   if (axis == Eigen::Vector3d::UnitZ()) return Eigen::Matrix3d::Identity();
   Eigen::Index least = 0;
@@ -16,10 +18,25 @@ Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {
   return R;
 }
 
+/// Mass and weight beyond each joint, from the tip: what the arm weighs when stretched out level.
+void sum_outward(std::vector<AxisLink>& links, double gravity, double& energy_scale) {
+  double mass = 0, moment = 0;  // moment: sum of mass times stretched distance from this joint
+  for (std::size_t i = links.size(); i-- > 0;) {
+    AxisLink& k = links[i];
+    mass += k.mass;
+    moment += std::sqrt(dot(k.h, k.h));
+    k.outer_mass = mass;
+    k.weight = gravity * (k.prismatic ? mass : moment);
+    energy_scale = gravity * moment;
+    moment += mass * std::sqrt(dot(k.p_PJ, k.p_PJ));
+  }
+}
+
 }  // namespace
 
 AxisChain::AxisChain(const model::Chain& chain) : gravity_W(lie::vec3(chain.gravity_W_mps2())) {
-  lie::Pose X_PZ = chain.X_WB0();  // parent link's frame seen from the parent's axis frame; the base from the world
+  lie::Pose X_PZ =
+      chain.X_WB0();  // parent link's frame seen from the parent's axis frame; the base from the world
   for (int i = 0; i < chain.n(); ++i) {
     const model::Joint& joint = chain.joint(i);
     const model::Inertia& body = chain.link(i).inertia;
@@ -36,10 +53,13 @@ AxisChain::AxisChain(const model::Chain& chain) : gravity_W(lie::vec3(chain.grav
     a.I_o = lie::sym3(about_com + body.mass_kg * shift);
     a.damping = joint.damping;
     a.armature = joint.armature;
+    a.lower = joint.limits.lower;
+    a.upper = joint.limits.upper;
     a.prismatic = joint.kind == model::JointKind::prismatic;
     links.push_back(a);
     X_PZ = {R_BZ.transpose(), Eigen::Vector3d::Zero()};
   }
+  sum_outward(links, chain.gravity_W_mps2().norm(), energy_scale);
 }
 
 }  // namespace hamel::rbd

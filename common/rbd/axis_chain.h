@@ -1,8 +1,9 @@
 #pragma once
 /// The chain as the recursions read it: each link's frame turned so that its joint axis is the third axis.
 ///
-/// Then A_i = e_3 (revolute) or e_6 (prismatic), A_i^T F picks one number and I_i A_i one column.  Joint values,
-/// torques and energies do not notice; only link-frame quantities would, and those stay in rbd.h's link frames.
+/// Then A_i = e_3 (revolute) or e_6 (prismatic), A_i^T F picks one number and I_i A_i one column.  Joint
+/// values, torques and energies do not notice; only link-frame quantities would, and those stay in rbd.h's
+/// link frames.
 
 #include <vector>
 
@@ -20,6 +21,9 @@ struct AxisLink {
   double mass = 0;              ///< [kg]
   double damping = 0;           ///< [N m s/rad or N s/m]
   double armature = 0;          ///< [kg m^2 or kg]
+  double outer_mass = 0;        ///< of this link and all beyond it [kg]
+  double weight = 0;            ///< bound of |gravity torque| at this joint [N m or N]
+  double lower = 0, upper = 0;  ///< joint limits, +-infinity where there are none
   bool prismatic = false;
 };
 
@@ -27,6 +31,7 @@ struct AxisChain {
   explicit AxisChain(const model::Chain& chain);
   std::vector<AxisLink> links;
   lie::Vec3<double> gravity_W;  ///< [m/s^2]
+  double energy_scale = 0;      ///< weight times reach of the whole arm [J]
   int n() const noexcept { return static_cast<int>(links.size()); }
   const AxisLink& operator[](int i) const noexcept { return links[static_cast<std::size_t>(i)]; }
 };

@@ -5,8 +5,8 @@
 namespace hamel::rbd {
 namespace {
 
-/// Twists (5) and wrenches that the motion and gravity ask for, base to tip.  `a` is the classic trick: the base
-/// accelerates against gravity.  With qdd null the joints' own acceleration is left out.
+/// Twists (5) and wrenches that the motion and gravity ask for, base to tip.  `a` is the classic trick: the
+/// base accelerates against gravity.  With qdd null the joints' own acceleration is left out.
 void forward_sweep(const double* q, const double* qd, const double* qdd, Workspace& ws) noexcept {
   const Vec3<double>& g = ws.axis.gravity_W;
   Half6<double> V{}, a{{}, {-g.x, -g.y, -g.z}};
@@ -29,7 +29,8 @@ void forward_sweep(const double* q, const double* qd, const double* qdd, Workspa
 
 void inverse_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
                       Ref<const VectorXd> qdd, Workspace& ws, Ref<VectorXd> tau) noexcept {
-  assert(q.size() == chain.n() && qd.size() == chain.n() && qdd.size() == chain.n() && tau.size() == chain.n());
+  assert(q.size() == chain.n() && qd.size() == chain.n() && qdd.size() == chain.n() &&
+         tau.size() == chain.n());
   forward_sweep(q.data(), qd.data(), qdd.data(), ws);
   Half6<double> F{};
   for (int i = chain.n(); i-- > 0;) {
@@ -43,7 +44,8 @@ void inverse_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<cons
 
 void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
                       Ref<const VectorXd> tau, Workspace& ws, Ref<VectorXd> qdd) noexcept {
-  assert(q.size() == chain.n() && qd.size() == chain.n() && tau.size() == chain.n() && qdd.size() == chain.n());
+  assert(q.size() == chain.n() && qd.size() == chain.n() && tau.size() == chain.n() &&
+         qdd.size() == chain.n());
   // The motion with qdd = 0 costs wrenches; what is left of tau after them meets M qdd.
   forward_sweep(q.data(), qd.data(), nullptr, ws);
   Half6<double> F{};

@@ -15,7 +15,8 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// X_PB(q) = X_PJ exp(A q), Eq. (3).
 Pose pose_in_parent(const model::Joint& joint, double q) {
-  if (joint.kind == model::JointKind::prismatic) return {joint.X_PJ.R, joint.X_PJ.p + joint.X_PJ.R * (q * joint.axis)};
+  if (joint.kind == model::JointKind::prismatic)
+    return {joint.X_PJ.R, joint.X_PJ.p + joint.X_PJ.R * (q * joint.axis)};
   // Rodrigues about a unit axis: 1 + sin W + (1 - cos) W^2, the last factor without cancellation
   const Eigen::Matrix3d W = lie::hat(joint.axis);
   const double s2 = std::sin(0.5 * q);
@@ -65,7 +66,8 @@ void positions(const model::Chain& chain, Ref<const VectorXd> q, Workspace& ws) 
   }
 }
 
-void velocities(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Workspace& ws) noexcept {
+void velocities(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
+                Workspace& ws) noexcept {
   assert(qd.size() == chain.n());
   positions(chain, q, ws);
   for (int i = 0; i < chain.n(); ++i) {
@@ -155,7 +157,8 @@ double kinetic_energy(const model::Chain& chain, const Workspace& ws, Ref<const 
   for (int i = 0; i < chain.n(); ++i) {
     const model::Inertia& body = chain.link(i).inertia;
     const Eigen::Vector3d w = ws.V_B[at(i)].head<3>(), v = ws.V_B[at(i)].tail<3>() + w.cross(body.com_m);
-    twice += w.dot(body.about_com_kgm2 * w) + body.mass_kg * v.squaredNorm() + chain.joint(i).armature * qd[i] * qd[i];
+    twice += w.dot(body.about_com_kgm2 * w) + body.mass_kg * v.squaredNorm() +
+             chain.joint(i).armature * qd[i] * qd[i];
   }
   return 0.5 * twice;
 }

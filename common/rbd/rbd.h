@@ -2,9 +2,9 @@
 /// Kinematics and dynamics of a chain: free functions over (const Chain&, ..., Workspace&).
 ///
 /// Order of use: positions() or velocities() fill the workspace for a configuration; everything that takes a
-/// const Workspace& afterwards reads that configuration.  No function here allocates, locks or throws; sizes are the
-/// caller's duty (asserted).  q, qd, tau: n joint values [rad or m], [rad/s or m/s], [N m or N].
-/// A row, block or other strided q, qd or tau must be copied to a vector first: Ref would copy it on the heap.
+/// const Workspace& afterwards reads that configuration.  No function here allocates, locks or throws; sizes
+/// are the caller's duty (asserted).  q, qd, tau: n joint values [rad or m], [rad/s or m/s], [N m or N]. A
+/// row, block or other strided q, qd or tau must be copied to a vector first: Ref would copy it on the heap.
 
 #include <Eigen/Core>
 #include <vector>
@@ -14,16 +14,16 @@
 
 namespace hamel::rbd {
 
+using Eigen::MatrixXd;
 using Eigen::Ref;
 using Eigen::VectorXd;
-using Eigen::MatrixXd;
 
 /// Scratch sized for one chain; one a thread.
 struct Workspace {
   explicit Workspace(const model::Chain& chain);
-  std::vector<lie::Pose> X_PB;     ///< pose of link i in link i-1 (base for i = 0)
-  std::vector<lie::Pose> X_WB;     ///< pose of link i in the world
-  std::vector<lie::Twist> V_B;     ///< twist of link i in the world, in frame i; Eq. (5)
+  std::vector<lie::Pose> X_PB;  ///< pose of link i in link i-1 (base for i = 0)
+  std::vector<lie::Pose> X_WB;  ///< pose of link i in the world
+  std::vector<lie::Twist> V_B;  ///< twist of link i in the world, in frame i; Eq. (5)
 
   // For inverse_dynamics() and forward_dynamics(), in axis frames; no meaning between calls.
   AxisChain axis;
@@ -36,30 +36,37 @@ struct Workspace {
 /// Poses of all links.  Eqs. (3), (4).
 void positions(const model::Chain& chain, Ref<const VectorXd> q, Workspace& ws) noexcept;
 /// Poses and twists of all links.  Eqs. (3)-(5).
-void velocities(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Workspace& ws) noexcept;
+void velocities(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
+                Workspace& ws) noexcept;
 /// Pose of the end effector in the world.
 lie::Pose tip(const model::Chain& chain, const Workspace& ws) noexcept;
 /// J (3 x n): velocity of the point of link `link` now at p_W, world axes.  Columns beyond `link` are zero.
-void point_jacobian(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W, Ref<MatrixXd> J) noexcept;
+void point_jacobian(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W,
+                    Ref<MatrixXd> J) noexcept;
 /// J (6 x n): twist of the frame at p_W on link `link`, world axes (omega, v of that point).
-void frame_jacobian(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W, Ref<MatrixXd> J) noexcept;
+void frame_jacobian(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W,
+                    Ref<MatrixXd> J) noexcept;
 /// Acceleration of the point of `link` now at p_W when qdd = 0 (Jdot qd), world axes.  Needs velocities().
-Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept;
+Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link,
+                                        const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept;
 /// M (n x n, both triangles), armature included.
 void mass_matrix(const model::Chain& chain, const Workspace& ws, Ref<MatrixXd> M) noexcept;
 /// Torque that holds the arm against gravity: tau_g(q) = dU/dq, so that M qdd + c + tau_g = tau.
 void gravity_torque(const model::Chain& chain, const Workspace& ws, Ref<VectorXd> tau_g) noexcept;
 /// tau = M(q) qdd + c(q, qd) + tau_g(q), recursive, O(n).  Eqs. (5), (8).  No joint damping.
 /// tau may be qdd.  What positions() and velocities() left in the workspace stays.
-void inverse_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Ref<const VectorXd> qdd, Workspace& ws, Ref<VectorXd> tau) noexcept;
+void inverse_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
+                      Ref<const VectorXd> qdd, Workspace& ws, Ref<VectorXd> tau) noexcept;
 /// qdd from tau by the articulated-body sweep, O(n).  Joint damping acts.  qdd may be tau.
 /// What positions() and velocities() left in the workspace stays.
-void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Ref<const VectorXd> tau, Workspace& ws, Ref<VectorXd> qdd) noexcept;
+void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
+                      Ref<const VectorXd> tau, Workspace& ws, Ref<VectorXd> qdd) noexcept;
 /// Kinetic energy [J], armature included.  Needs velocities().
 double kinetic_energy(const model::Chain& chain, const Workspace& ws, Ref<const VectorXd> qd) noexcept;
 /// Potential energy [J] -sum m g . r, zero at the world's origin.
 double potential_energy(const model::Chain& chain, const Workspace& ws) noexcept;
-/// The energy scale of agreements: sum m_i |g| r_i, r_i the sum of joint-to-joint offsets up to the centre of mass i [J].
+/// The energy scale of agreements: sum m_i |g| r_i, r_i the sum of joint-to-joint offsets up to the centre of
+/// mass i [J].
 double energy_scale(const model::Chain& chain) noexcept;
 
 }  // namespace hamel::rbd

@@ -19,17 +19,27 @@ struct Half6 {
   Vec3<S> a, l;
 };
 template <class S>
-inline Half6<S> operator+(const Half6<S>& x, const Half6<S>& y) { return {x.a + y.a, x.l + y.l}; }
+inline Half6<S> operator+(const Half6<S>& x, const Half6<S>& y) {
+  return {x.a + y.a, x.l + y.l};
+}
 template <class S>
-inline Half6<S> operator-(const Half6<S>& x, const Half6<S>& y) { return {x.a - y.a, x.l - y.l}; }
+inline Half6<S> operator-(const Half6<S>& x, const Half6<S>& y) {
+  return {x.a - y.a, x.l - y.l};
+}
 template <class A, class S>
-inline Half6<lie::Prod<A, S>> operator*(const A& s, const Half6<S>& x) { return {s * x.a, s * x.l}; }
+inline Half6<lie::Prod<A, S>> operator*(const A& s, const Half6<S>& x) {
+  return {s * x.a, s * x.l};
+}
 
 /// A^T F: the component along the joint.
 template <class S>
-inline const S& along(const AxisLink& link, const Half6<S>& F) { return link.prismatic ? F.l.z : F.a.z; }
+inline const S& along(const AxisLink& link, const Half6<S>& F) {
+  return link.prismatic ? F.l.z : F.a.z;
+}
 template <class S>
-inline S& along(const AxisLink& link, Half6<S>& F) { return link.prismatic ? F.l.z : F.a.z; }
+inline S& along(const AxisLink& link, Half6<S>& F) {
+  return link.prismatic ? F.l.z : F.a.z;
+}
 
 template <class S>
 struct LinkPose {
@@ -89,7 +99,9 @@ inline Half6<S> bracket_with_axis(const AxisLink& k, const Half6<S>& V, const S&
 }
 /// Gravity wrench (h x g, m g) for gravity g in the link's frame.
 template <class S>
-inline Half6<S> gravity_wrench(const AxisLink& k, const Vec3<S>& g) { return {cross(k.h, g), k.mass * g}; }
+inline Half6<S> gravity_wrench(const AxisLink& k, const Vec3<S>& g) {
+  return {cross(k.h, g), k.mass * g};
+}
 
 /// Articulated inertia [[J, H], [H^T, M]].
 template <class S>
@@ -100,8 +112,8 @@ struct Articulated {
 /// What one joint keeps of the articulated-body factorisation.
 template <class S>
 struct JointFactor {
-  Half6<S> U;      ///< I^A A
-  S D_inv{};       ///< 1 / (A^T I^A A + armature + extra)
+  Half6<S> U;  ///< I^A A
+  S D_inv{};   ///< 1 / (A^T I^A A + armature + extra)
 };
 
 /// Adds link k's own inertia.
@@ -122,7 +134,8 @@ inline Half6<S> joint_column(const AxisLink& k, const Articulated<S>& I) {
 /// I^a = I^A - U U^T / D.
 template <class S>
 inline Articulated<S> deflate(const Articulated<S>& I, const JointFactor<S>& f) {
-  return {minus_outer(I.J, f.D_inv, f.U.a), minus_outer(I.M, f.D_inv, f.U.l), minus_outer(I.H, f.D_inv, f.U.a, f.U.l)};
+  return {minus_outer(I.J, f.D_inv, f.U.a), minus_outer(I.M, f.D_inv, f.U.l),
+          minus_outer(I.H, f.D_inv, f.U.a, f.U.l)};
 }
 /// X^T I X: the inertia seen from the parent.  With H' = R H R^T, M' = R M R^T and K = H' + hat(p) M' / 2:
 /// H_P = H' + hat(p) M', J_P = R J R^T + W + W^T with W = hat(p) K^T.
@@ -155,7 +168,8 @@ void factorise(const AxisChain& chain, const LinkPose<S>* X, const S* extra, Joi
 }
 /// x = (M + diag(extra))^-1 b from the factorisation, O(n).  x and b may be the same; `u` is scratch.
 template <class S>
-void solve(const AxisChain& chain, const LinkPose<S>* X, const JointFactor<S>* f, const S* b, S* u, S* x) noexcept {
+void solve(const AxisChain& chain, const LinkPose<S>* X, const JointFactor<S>* f, const S* b, S* u,
+           S* x) noexcept {
   Half6<S> p{};
   for (int i = chain.n(); i-- > 0;) {
     const AxisLink& k = chain[i];

@@ -44,6 +44,7 @@ struct PlannerOptions {
   double kp = 10;                    ///< attraction, Eq. (17) [1/s^2], > 0
   double kv = 6.3;                   ///< attraction, Eq. (17) [1/s], > 0
   double vmax_mps = kInf;            ///< target speed the attraction saturates at, > 0
+  double angular_vmax_radps = kInf;  ///< pose goals: turning speed the attraction saturates at, > 0
   double amax = kInf;                ///< acceleration limit of the command [rad/s^2 or m/s^2], > 0
   double damping = 0.5;              ///< bj: tau_d = -bj M qd [1/s], >= 0
   double eta = 0.02;                 ///< Khatib's repulsion, Eq. (18), >= 0
@@ -70,6 +71,8 @@ struct PlannerOptions {
   double goal_hold_s = 0.1;          ///< REACHED after so long, >= 0
   double stale_brake_s = 0.3;        ///< obstacles older than this: stop and UNSAFE, > 0
   double stale_slow_s = 0.1;         ///< obstacles older than this: slow down, > 0
+  double stale_state_s = 0.05;       ///< arm state older than this: brake and UNSAFE, > 0
+  double brake_rate = 60;            ///< bmax: braking is qdd = -bmax qd [1/s], > 0
   double assumed_speed_mps = 0;      ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
   double ramp_s = 0.2;               ///< after a restart without memory the command ramps in over it, >= 0
 };

@@ -27,7 +27,7 @@ struct Robot {
   std::string urdf;                  ///< the file's text, for the wire and for recordings
   model::Chain chain;
   std::vector<LinkShape> shapes;
-  std::vector<std::string> warnings; ///< what was read otherwise than written, e.g. "link hand: mesh left out"
+  std::vector<std::string> warnings = {}; ///< what was read otherwise than written, e.g. "link hand: mesh left out"
 };
 
 enum class GoalKind : std::uint8_t { position, pose, joints };

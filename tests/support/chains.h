@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
+#include <string>
 
 #include "common/lie/se3.h"
 #include "common/model/chain.h"
@@ -47,18 +49,18 @@ inline model::Chain checked(model::ChainSpec spec) {
   return chain.value();
 }
 
-/// A planar arm along +x that turns about +z, gravity along -y; links of one mass, length and inertia about their
-/// middle [kg, m, kg m^2].
+/// A planar arm along +x that turns about +z, gravity along -y; links of one mass, length and inertia about
+/// their middle [kg, m, kg m^2].
 inline model::ChainSpec planar(int n, double mass_kg, double length_m, double inertia_kgm2) {
   model::ChainSpec spec;
   spec.name = "planar";
   spec.gravity_W_mps2 = {0, -9.81, 0};
   for (int i = 0; i < n; ++i) {
     model::Joint joint;
-    joint.name = "j" + std::to_string(i + 1);
+    joint.name = std::string("j").append(std::to_string(i + 1));
     if (i > 0) joint.X_PJ.p = {length_m, 0, 0};
     model::Link link;
-    link.name = "l" + std::to_string(i + 1);
+    link.name = std::string("l").append(std::to_string(i + 1));
     link.inertia.mass_kg = mass_kg;
     link.inertia.com_m = {0.5 * length_m, 0, 0};
     link.inertia.about_com_kgm2 = inertia_kgm2 * Eigen::Matrix3d::Identity();
@@ -81,11 +83,11 @@ inline model::Chain paper_5_2() {
 inline model::Chain fast_rods() { return checked(planar(3, 1, 1, 1.0 / 12)); }
 
 struct RandomChain {
-  double prismatic = 0.2;     ///< share of prismatic joints
-  double armature = 0.3;      ///< share of joints with armature
-  double damping = 0;         ///< share of joints with damping
+  double prismatic = 0.2;  ///< share of prismatic joints
+  double armature = 0.3;   ///< share of joints with armature
+  double damping = 0;      ///< share of joints with damping
   bool gravity = true;
-  double mass_spread = 1;     ///< masses within 10^-+ this
+  double mass_spread = 1;  ///< masses within 10^-+ this
 };
 /// A spatial chain with nothing aligned to anything.
 inline model::ChainSpec random_spec(Random& rng, int n, const RandomChain& how = {}) {
@@ -106,7 +108,8 @@ inline model::ChainSpec random_spec(Random& rng, int n, const RandomChain& how =
     body.mass_kg = std::pow(10, rng.uniform(-how.mass_spread, how.mass_spread));
     body.com_m = rng.vec3(0.3);
     // moments of a box with these half edges: always a possible body
-    const Eigen::Array3d s = Eigen::Array3d(rng.uniform(0.05, 0.4), rng.uniform(0.05, 0.4), rng.uniform(0.05, 0.4)).square();
+    const Eigen::Array3d s =
+        Eigen::Array3d(rng.uniform(0.05, 0.4), rng.uniform(0.05, 0.4), rng.uniform(0.05, 0.4)).square();
     const Eigen::Vector3d moments(s[1] + s[2], s[0] + s[2], s[0] + s[1]);
     const Eigen::Matrix3d R = lie::exp_so3(rng.uniform(0, 3) * rng.unit());
     body.about_com_kgm2 = body.mass_kg / 3 * R * moments.asDiagonal() * R.transpose();

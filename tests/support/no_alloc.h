@@ -1,8 +1,8 @@
 #pragma once
 /// Counts heap calls of this thread while alive.  Include in one file of an executable: it replaces malloc.
 ///
-/// Hooks malloc itself: Eigen's dynamic matrices call malloc directly, so counting operator new would miss them.
-/// glibc only; counts nothing under sanitizers (supported() says so).
+/// Hooks malloc itself: Eigen's dynamic matrices call malloc directly, so counting operator new would miss
+/// them. glibc only; counts nothing under sanitizers (supported() says so).
 
 #include <cstddef>
 
@@ -43,6 +43,8 @@ void* __libc_memalign(std::size_t, std::size_t);
 void* malloc(std::size_t n) { return hamel::test::NoAlloc::count(), __libc_malloc(n); }
 void* calloc(std::size_t n, std::size_t m) { return hamel::test::NoAlloc::count(), __libc_calloc(n, m); }
 void* realloc(void* p, std::size_t n) { return hamel::test::NoAlloc::count(), __libc_realloc(p, n); }
-void* aligned_alloc(std::size_t a, std::size_t n) { return hamel::test::NoAlloc::count(), __libc_memalign(a, n); }
+void* aligned_alloc(std::size_t a, std::size_t n) {
+  return hamel::test::NoAlloc::count(), __libc_memalign(a, n);
+}
 }
 #endif

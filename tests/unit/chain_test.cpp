@@ -53,12 +53,16 @@ INSTANTIATE_TEST_SUITE_P(
         Spoiled{"gravity", [](ChainSpec& s) { s.gravity_W_mps2[2] = kNaN; }, "gravity"},
         Spoiled{"mass", [](ChainSpec& s) { s.links[2].inertia.mass_kg = -1; }, "mass_kg: = -1"},
         Spoiled{"mass_nan", [](ChainSpec& s) { s.links[2].inertia.mass_kg = kNaN; }, "mass_kg: = nan"},
-        Spoiled{"inertia_zero", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2.setZero(); }, "positive definite"},
-        Spoiled{"inertia_negative", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2(1, 1) = -1; }, "positive definite"},
+        Spoiled{"inertia_zero", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2.setZero(); },
+                "positive definite"},
+        Spoiled{"inertia_negative", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2(1, 1) = -1; },
+                "positive definite"},
         Spoiled{"triangle", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2(1, 1) = 1; }, "triangle"},
-        Spoiled{"asymmetric", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2(0, 1) = 0.01; }, "symmetric"},
+        Spoiled{"asymmetric", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2(0, 1) = 0.01; },
+                "symmetric"},
         Spoiled{"none", [](ChainSpec& s) { s.links[1].inertia = {}; }, "needs mass and inertia"},
-        Spoiled{"limits", [](ChainSpec& s) { s.joints[0].limits.lower = 1, s.joints[0].limits.upper = 0; }, "lower 1"},
+        Spoiled{"limits", [](ChainSpec& s) { s.joints[0].limits.lower = 1, s.joints[0].limits.upper = 0; },
+                "lower 1"},
         Spoiled{"effort", [](ChainSpec& s) { s.joints[0].limits.effort = 0; }, "effort: = 0"},
         Spoiled{"damping", [](ChainSpec& s) { s.joints[0].damping = -1; }, "damping: = -1"},
         Spoiled{"armature", [](ChainSpec& s) { s.joints[0].armature = kNaN; }, "armature: = nan"}),
@@ -76,7 +80,7 @@ TEST(Chain, ListsEveryProblemAtOnce) {
 
 TEST(Chain, TakesFlatAndExtremeBodies) {
   ChainSpec spec = test::planar(3, 1, 1, 0.1);
-  spec.links[0].inertia.about_com_kgm2.diagonal() = Eigen::Vector3d(1, 1, 2);   // a disc: equality
+  spec.links[0].inertia.about_com_kgm2.diagonal() = Eigen::Vector3d(1, 1, 2);  // a disc: equality
   spec.links[1].inertia.about_com_kgm2 *= 1e-8;
   spec.links[2].inertia.mass_kg = 1e6;
   EXPECT_TRUE(build(spec));

@@ -1,0 +1,226 @@
+#include "clients/hamel/monitor.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+
+#include "common/runtime/options.h"
+
+namespace hamel::client {
+
+using namespace std::chrono_literals;
+
+namespace {
+constexpr auto kPatience = 20s;          // nothing heard for so long: the run is lost
+constexpr auto kLastWords = 500ms;       // after the final summary, for the last report
+constexpr std::size_t kRowsWaiting = 200;
+}  // namespace
+
+Result<std::unique_ptr<CsvWriter>, Problem> CsvWriter::open(const std::string& path, int n) {
+  std::unique_ptr<CsvWriter> w(new CsvWriter);
+  w->path_ = path;
+  w->file_ = std::fopen(path.c_str(), "w");
+  if (!w->file_) return Problem{path, std::string("cannot write: ") + std::strerror(errno)};
+  std::string header = "t_s";
+  for (const char* name : {"q", "qd", "tau_Nm"})
+    for (int i = 0; i < n; ++i) header += fmt::format(",{}{}", name, i + 1);
+  header += ",ee_x_m,ee_y_m,ee_z_m,clearance_m,energy_J,work_J,iterations,residual_Nm\n";
+  std::fputs(header.c_str(), w->file_);
+  return w;
+}
+
+CsvWriter::~CsvWriter() {
+  if (file_) std::fclose(file_);
+}
+
+void CsvWriter::row(const wire::ArmState& s, const Eigen::Vector3d& tip_m, double clearance_m) {
+  fmt::memory_buffer b;
+  const auto out = std::back_inserter(b);
+  fmt::format_to(out, "{:.9g}", s.t_s);
+  for (const auto* v : {&s.position, &s.velocity, &s.torque_applied})
+    for (Eigen::Index i = 0; i < v->size(); ++i) fmt::format_to(out, ",{:.17g}", (*v)[i]);
+  fmt::format_to(out, ",{:.9g},{:.9g},{:.9g},{:.9g},{:.17g},{:.17g},{},{:.3g}\n", tip_m.x(), tip_m.y(), tip_m.z(), clearance_m,
+                 s.energy_J, s.work_J, s.solver.iterations, s.solver.residual_Nm);
+  failed_ |= std::fwrite(b.data(), 1, b.size(), file_) != b.size();
+}
+
+std::optional<Problem> CsvWriter::finish() {
+  failed_ |= std::fflush(file_) != 0;
+  if (failed_) return Problem{path_, "could not be written whole: is the disk full?"};
+  return std::nullopt;
+}
+
+Monitor::Monitor(bus::Node& node, const scene::Scene& scene, std::unique_ptr<CsvWriter> csv, bool live)
+    : scene_(scene),
+      state_in_(node),
+      report_in_(node),
+      summary_in_(node),
+      csv_(std::move(csv)),
+      live_(live && isatty(STDERR_FILENO)),
+      ws_(scene.robot.chain),
+      began_(runtime::Clock::now()),
+      last_heard_(began_),
+      last_shown_(began_),
+      ended_(began_) {}
+
+bool Monitor::poll(Time now) {
+  const auto before = states_ + reports_;
+  take_reports();
+  take_states();
+  wire::RunSummary s;
+  while (summary_in_.take(s)) {
+    if (s.arm != scene_.arm) continue;
+    if (s.final_summary && !(summary_ && summary_->final_summary)) final_heard_ = now;
+    summary_ = s;
+    last_heard_ = now;
+  }
+  write_rows(false);
+  const bool heard = states_ + reports_ != before;
+  if (heard) last_heard_ = now;
+  show(now);
+
+  if (!finished_ && summary_ && summary_->final_summary) {
+    const bool last_report = !scene_.steered || (report_ && report_->step >= summary_->steps);
+    finished_ = last_report || now - final_heard_ > kLastWords;
+  }
+  if (!finished_ && now - last_heard_ > kPatience) finished_ = true;
+  if (finished_) {
+    ended_ = now;
+    write_rows(true);
+    if (live_) std::fputs("\r\033[K", stderr);
+  }
+  return heard;
+}
+
+runtime::Clock::time_point Monitor::due() const {
+  return std::min(last_shown_ + 250ms, summary_ && summary_->final_summary ? final_heard_ + kLastWords : last_shown_ + 250ms);
+}
+
+void Monitor::take_states() {
+  wire::ArmState s;
+  while (state_in_.take(s)) {
+    if (s.arm != scene_.arm || s.position.size() != scene_.robot.chain.n()) continue;
+    const bool repeated = state_ && s.incarnation == state_->incarnation && s.step <= state_->step;
+    if (repeated) continue;
+    if (state_ && s.incarnation == state_->incarnation) rows_lost_ += s.step - state_->step - 1;
+    ++states_;
+    state_ = s;
+    if (csv_) rows_.push_back(s);
+  }
+}
+
+void Monitor::take_reports() {
+  wire::PlannerReport r;
+  while (report_in_.take(r)) {
+    if (r.arm != scene_.arm) continue;
+    ++reports_;
+    clearance_min_m_ = std::min(clearance_min_m_, r.clearance_min_m);
+    contacts_ = std::max(contacts_, r.contacts);
+    report_ = std::move(r);
+    write_rows(false);
+  }
+}
+
+/// A row waits for the report of its step: states and reports come from different writers.
+void Monitor::write_rows(bool all) {
+  if (!csv_) return;
+  while (!rows_.empty()) {
+    const wire::ArmState& s = rows_.front();
+    const bool ready = all || !scene_.steered || (report_ && report_->step >= s.step) || rows_.size() > kRowsWaiting;
+    if (!ready) return;
+    rbd::positions(scene_.robot.chain, s.position, ws_);
+    csv_->row(s, rbd::tip(scene_.robot.chain, ws_).p, report_ ? report_->clearance_m : wire::kInf);
+    rows_.pop_front();
+  }
+}
+
+/// One line, rewritten in place four times a second.
+void Monitor::show(Time now) {
+  if (now - last_shown_ < 250ms) return;
+  const double dt_s = std::chrono::duration<double>(now - last_shown_).count();
+  if (live_ && state_) {
+    const double drift = summary_ ? summary_->energy_drift_rel : 0;
+    std::string line = fmt::format("t={:.1f}s {:.2f}x dyn {:.0f}Hz", state_->t_s, (state_->t_s - shown_t_s_) / dt_s,
+                                   static_cast<double>(states_ - shown_states_) / dt_s);
+    if (report_)
+      line += fmt::format(" plan {:.0f}us {} error {:.3f}m clearance {:.3f}m", report_->cycle_time_s * 1e6,
+                          wire::to_string(report_->state), report_->target_error_m, report_->clearance_m);
+    line += fmt::format(" dE/E {:.0e}", drift);
+    if (restarts_ > 0) line += fmt::format(" restarts {}", restarts_);
+    line += fmt::format(" unseen {}", rows_lost_);
+    fmt::print(stderr, "\r\033[K{}", line);
+    std::fflush(stderr);
+  }
+  last_shown_ = now;
+  shown_t_s_ = state_ ? state_->t_s : 0;
+  shown_states_ = states_;
+  shown_reports_ = reports_;
+}
+
+namespace {
+
+/// Names the end of a run and its exit code (agreements: "Command line").
+void judge(Outcome& o, const scene::Scene& scene, const wire::PlannerReport* last) {
+  const auto say = [&](const char* outcome, std::string reason, int code) {
+    o.outcome = outcome;
+    o.reason = std::move(reason);
+    o.exit_code = code;
+  };
+  if (o.summary.outcome == "diverged") return say("FAULT", "diverged", runtime::kFailed);
+  if (o.summary.outcome == "no_command") return say("NO_DATA", "no_command", runtime::kNoData);
+  if (!scene.steered) return say("DONE", "", runtime::kDone);
+  if (!last) return say("NO_DATA", "no_report", runtime::kNoData);
+  if (o.contacts > 0) return say("UNSAFE", wire::to_string(wire::Reason::contact), runtime::kFailed);
+  const std::string reason = last->reason == wire::Reason::none ? "" : wire::to_string(last->reason);
+  switch (last->state) {
+    case wire::PlannerState::reached: return say("REACHED", reason, runtime::kDone);
+    case wire::PlannerState::stuck:
+    case wire::PlannerState::unsafe:
+    case wire::PlannerState::fault: return say(wire::to_string(last->state), reason, runtime::kFailed);
+    default: return say(wire::to_string(last->state), "not_reached_in_time", runtime::kNoData);
+  }
+}
+
+}  // namespace
+
+Outcome Monitor::outcome(bool interrupted) {
+  Outcome o;
+  if (!finished_) ended_ = runtime::Clock::now();
+  write_rows(true);
+  if (live_) std::fputs("\r\033[K", stderr);
+  o.wall_s = std::chrono::duration<double>(ended_ - began_).count();
+  o.t_s = state_ ? state_->t_s : 0;
+  if (summary_) o.summary = *summary_;
+  o.contacts = contacts_;
+  o.min_clearance_m = clearance_min_m_;
+  o.rows_lost = rows_lost_;
+  if (report_) {
+    o.detail = report_->detail;
+    o.time_to_goal_s = report_->time_to_goal_s;
+    o.final_error_m = report_->target_error_m;
+    o.path_length_m = report_->path_length_m;
+  }
+  if (!summary_ || !state_) {
+    o.outcome = "NO_DATA";
+    o.reason = state_ ? "no_summary" : "no_state";
+    o.exit_code = runtime::kNoData;
+  } else {
+    judge(o, scene_, report_ ? &*report_ : nullptr);
+    if (!o.summary.final_summary && !interrupted) {
+      o.outcome = "NO_DATA";
+      o.reason = "the run went silent";
+      o.exit_code = runtime::kNoData;
+    }
+  }
+  if (interrupted) {
+    o.outcome = "INTERRUPTED";
+    o.exit_code = runtime::kInterrupted;
+  }
+  return o;
+}
+
+}  // namespace hamel::client

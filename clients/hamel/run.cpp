@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include "clients/hamel/commands.h"
+#include "clients/hamel/print.h"
+#include "common/runtime/log.h"
+#include "services/dynamics/service.h"
+#include "services/perception/service.h"
+#include "services/planner/service.h"
+
+namespace hamel::client {
+
+namespace {
+
+int conclude(const scene::Scene& scene, Monitor& monitor, bool interrupted, const RunArgs& args, const std::string& pace,
+             const std::string& bus) {
+  const Outcome o = monitor.outcome(interrupted);
+  if (args.json)
+    print_json(scene, o);
+  else
+    print_table(scene, o, pace, bus);
+  if (const auto p = monitor.finish_csv()) return runtime::complain("hamel run", {*p});
+  return o.exit_code;
+}
+
+}  // namespace
+
+int run(const RunArgs& args) {
+  runtime::StopSignal stop;
+  runtime::start_log("hamel", args.run.verbose);
+  const auto scene = runtime::load(args.run);
+  if (!scene) return runtime::complain("hamel run", scene.error());
+  const scene::Scene& s = scene.value();
+  auto node = runtime::open_node(args.run.bus, "inproc", "hamel-run");
+  if (!node) return runtime::complain("hamel run", {node.error()});
+  bus::Node& n = *node.value();
+  const auto pace = runtime::pace(args.run, scene::Pace::lockstep);
+
+  std::unique_ptr<CsvWriter> csv;
+  if (!args.csv_path.empty()) {
+    auto w = CsvWriter::open(args.csv_path, s.robot.chain.n());
+    if (!w) return runtime::complain("hamel run", {w.error()});
+    csv = std::move(w).value();
+  }
+  auto arm = dynamics::DynamicsService::make(n, s, {.pace = pace, .state_dir = args.run.state_dir});
+  if (!arm) return runtime::complain("hamel run", {arm.error()});
+  auto perception = perception::PerceptionService::make(n, s);
+  if (!perception) return runtime::complain("hamel run", perception.error());
+  auto planner = planner::PlannerService::make(n, s, {.pace = pace, .state_dir = args.run.state_dir});
+  if (!planner) return runtime::complain("hamel run", {planner.error()});
+  Monitor monitor(n, s, std::move(csv), !args.json);
+
+  // Perception first: in lockstep its sets are there before the planner looks for them.
+  std::vector<runtime::Service*> services{arm.value().get()};
+  if (s.steered) services.insert(services.end(), {perception.value().get(), planner.value().get()});
+  services.push_back(&monitor);
+  const bool ended = runtime::run(n, services, monitor, stop);
+  monitor.poll(runtime::Clock::now());
+  return conclude(s, monitor, !ended, args, scene::to_string(pace), bus::to_string(n.options().vendor));
+}
+
+}  // namespace hamel::client

@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+
+#include "clients/hamel/commands.h"
+#include "clients/hamel/print.h"
+#include "clients/hamel/supervisor.h"
+#include "common/runtime/log.h"
+
+namespace hamel::client {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+/// A folder for this run's checkpoints, removed with it.
+class TemporaryFolder {
+ public:
+  static Result<std::unique_ptr<TemporaryFolder>, Problem> make() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "hamel-XXXXXX").string();
+    if (!mkdtemp(pattern.data())) return Problem{pattern, "cannot make a folder for the checkpoints"};
+    return std::unique_ptr<TemporaryFolder>(new TemporaryFolder(pattern));
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  const std::string& path() const { return path_; }
+
+ private:
+  explicit TemporaryFolder(std::string path) : path_(std::move(path)) {}
+  std::string path_;
+};
+
+/// The supervisor as part of the loop.
+class Children final : public runtime::Service {
+ public:
+  Children(Supervisor& supervisor, Monitor& monitor) : supervisor_(supervisor), monitor_(monitor) {}
+  bool poll(runtime::Clock::time_point now) override {
+    supervisor_.poll(now);
+    monitor_.restarts(supervisor_.restarts());
+    return false;
+  }
+  runtime::Clock::time_point due() const override { return runtime::Clock::now() + 20ms; }
+  bool finished() const override { return monitor_.finished() || supervisor_.failed() != nullptr; }
+
+ private:
+  Supervisor& supervisor_;
+  Monitor& monitor_;
+};
+
+std::vector<std::string> command(const std::string& service, const RunArgs& a, const scene::Scene& s, scene::Pace pace,
+                                 const std::string& state_dir) {
+  const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  const auto beside = here / ("hamel-" + service);
+  std::vector<std::string> c{beside.string(), a.run.scene_path};
+  for (const auto& o : a.run.overrides) c.insert(c.end(), {"--set", o});
+  c.push_back(pace == scene::Pace::lockstep ? "--lockstep" : "--realtime");
+  c.insert(c.end(), {"--duration", fmt::format("{}", s.duration_s), "--state-dir", state_dir});
+  const auto& b = a.run.bus;
+  if (!b.vendor.empty()) c.insert(c.end(), {"--bus", b.vendor});
+  c.insert(c.end(), {"--domain", std::to_string(b.domain)});
+  if (!b.interface_name.empty()) c.insert(c.end(), {"--interface", b.interface_name});
+  for (const auto& p : b.peers) c.insert(c.end(), {"--peer", p});
+  if (a.run.verbose) c.push_back("--verbose");
+  return c;
+}
+
+}  // namespace
+
+int up(const RunArgs& args) {
+  runtime::StopSignal stop;
+  runtime::start_log("hamel", args.run.verbose);
+  const auto scene = runtime::load(args.run);
+  if (!scene) return runtime::complain("hamel up", scene.error());
+  const scene::Scene& s = scene.value();
+  auto node = runtime::open_node(args.run.bus, s.bus.dynamics, "hamel-up");
+  if (!node) return runtime::complain("hamel up", {node.error()});
+  bus::Node& n = *node.value();
+  if (n.options().vendor == bus::Vendor::inproc)
+    return runtime::complain("hamel up", {{"--bus inproc", "reaches one process only; use fastdds or cyclonedds, or hamel run"}});
+  const auto pace = runtime::pace(args.run, scene::Pace::realtime);
+
+  std::unique_ptr<CsvWriter> csv;
+  if (!args.csv_path.empty()) {
+    auto w = CsvWriter::open(args.csv_path, s.robot.chain.n());
+    if (!w) return runtime::complain("hamel up", {w.error()});
+    csv = std::move(w).value();
+  }
+  std::unique_ptr<TemporaryFolder> folder;
+  std::string state_dir = args.run.state_dir;
+  if (state_dir.empty()) {
+    auto f = TemporaryFolder::make();
+    if (!f) return runtime::complain("hamel up", {f.error()});
+    folder = std::move(f).value();
+    state_dir = folder->path();
+  } else if (std::error_code e; !std::filesystem::is_directory(state_dir) && !std::filesystem::create_directories(state_dir, e)) {
+    return runtime::complain("hamel up", {{state_dir, "cannot make the folder: " + e.message()}});
+  }
+
+  Monitor monitor(n, s, std::move(csv), !args.json);
+  Supervisor supervisor;
+  if (s.steered)
+    for (const char* name : {"perception", "planner"}) supervisor.add(name, command(name, args, s, pace, state_dir));
+  supervisor.add("dynamics", command("dynamics", args, s, pace, state_dir));
+  Children children(supervisor, monitor);
+  runtime::Service* const services[] = {&children, &monitor};
+  const bool ended = runtime::run(n, services, children, stop);
+  const Supervisor::Child* failed = supervisor.failed();
+  const int failed_code = failed ? failed->exit_code : 0;
+  supervisor.end();
+
+  const Outcome o = monitor.outcome(!ended);
+  if (failed && !monitor.finished()) {
+    spdlog::error("{} cannot run; ending", failed->name);
+    return failed_code == runtime::kBadInput ? runtime::kBadInput : runtime::kFailed;
+  }
+  if (args.json)
+    print_json(s, o);
+  else
+    print_table(s, o, scene::to_string(pace), bus::to_string(n.options().vendor));
+  if (supervisor.restarts() > 0) spdlog::info("{} restarts", supervisor.restarts());
+  if (const auto p = monitor.finish_csv()) return runtime::complain("hamel up", {*p});
+  return o.exit_code;
+}
+
+}  // namespace hamel::client

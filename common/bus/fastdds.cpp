@@ -1,0 +1,304 @@
+/// The bus over Fast DDS: UDP only, bytes pass through, listeners only notify.
+///
+/// Fast DDS's threads call the listeners; those live until the participant is gone, so that a callback still
+/// on its way when a reader or writer leaves finds them in place.
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
+#include <algorithm>
+#include <atomic>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <variant>
+
+#include "common/bus/backends.h"
+#include "common/bus/fastdds_type.h"
+#include "common/bus/network.h"
+#include "common/bus/notifier.h"
+
+namespace hamel::bus {
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::Duration_t;
+using eprosima::fastrtps::types::ReturnCode_t;
+
+Duration_t duration(std::chrono::milliseconds ms) {
+  return Duration_t(static_cast<long double>(ms.count()) * 1e-3L);
+}
+
+/// A late Cyclone reader waits for the writer's next heartbeat; Fast DDS's default is 3 s.
+constexpr std::chrono::milliseconds kHeartbeat{100};
+
+/// What the vendor's threads tell about one end.
+struct Events {
+  Events(const Topic& t, const NodeOptions& o, bool writes) : topic(t), options(o), we_write(writes) {}
+
+  void incompatible_with(int policy, int change) {
+    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
+    if (!logged.exchange(true) && options.log)
+      options.log(incompatible_sentence(topic, we_write, policy, Vendor::fastdds));
+  }
+
+  const Topic& topic;
+  const NodeOptions& options;
+  const bool we_write;
+  std::atomic<int> matched{0};
+  std::atomic<std::uint64_t> incompatible{0}, lost{0};
+  std::atomic<bool> logged{false};
+};
+
+struct WriterEvents final : Events, dds::DataWriterListener {
+  using Events::Events;
+  void on_publication_matched(dds::DataWriter*, const dds::PublicationMatchedStatus& status) override {
+    matched = status.current_count;
+  }
+  void on_offered_incompatible_qos(dds::DataWriter*,
+                                   const dds::OfferedIncompatibleQosStatus& status) override {
+    incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
+  }
+};
+
+struct ReaderEvents final : Events, dds::DataReaderListener {
+  ReaderEvents(const Topic& t, const NodeOptions& o, Notifier& n) : Events(t, o, false), notifier(n) {}
+  void on_data_available(dds::DataReader*) override { notifier.notify(); }
+  void on_subscription_matched(dds::DataReader*, const dds::SubscriptionMatchedStatus& status) override {
+    matched = status.current_count;
+  }
+  void on_requested_incompatible_qos(dds::DataReader*,
+                                     const dds::RequestedIncompatibleQosStatus& status) override {
+    incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
+  }
+  void on_sample_lost(dds::DataReader*, const dds::SampleLostStatus& status) override {
+    lost += static_cast<std::uint64_t>(std::max(status.total_count_change, 0));
+  }
+  Notifier& notifier;
+};
+
+/// The part of QoS that writers and readers share.
+template <class Qos>
+Qos common_qos(const Topic& topic) {
+  const bool latched = topic.delivery == Delivery::latched;
+  Qos qos;
+  qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
+  qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
+  qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = latched ? 1 : kStreamDepth;
+  qos.resource_limits().max_instances = kMaxInstances;
+  qos.resource_limits().max_samples_per_instance = qos.history().depth;
+  qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
+  qos.resource_limits().allocated_samples = latched ? 4 : 32;
+  qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  qos.data_sharing().off();
+  return qos;
+}
+
+dds::DataWriterQos writer_qos(const Topic& topic) {
+  auto qos = common_qos<dds::DataWriterQos>(topic);
+  qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
+  qos.reliable_writer_qos().times.heartbeatPeriod = duration(kHeartbeat);
+  qos.writer_data_lifecycle().autodispose_unregistered_instances = false;
+  return qos;
+}
+
+class FastWriter final : public Writer {
+ public:
+  FastWriter(const Topic& topic, dds::Publisher& publisher, dds::DataWriter& writer, WriterEvents& events)
+      : topic_(topic), publisher_(publisher), writer_(writer), events_(events) {}
+  ~FastWriter() override {
+    writer_.set_listener(nullptr);
+    publisher_.delete_datawriter(&writer_);
+  }
+
+  bool write(std::span<const std::byte> payload) override {
+    RawSample sample{payload, nullptr, payload.size()};
+    const bool sent = acceptable(payload, topic_) && writer_.write(&sample);
+    ++(sent ? samples_ : refused_);
+    return sent;
+  }
+  int matched() const override { return events_.matched; }
+  Counters counters() const override { return {samples_, 0, refused_, events_.incompatible}; }
+
+ private:
+  const Topic& topic_;
+  dds::Publisher& publisher_;
+  dds::DataWriter& writer_;
+  WriterEvents& events_;
+  std::uint64_t samples_ = 0, refused_ = 0;
+};
+
+class FastReader final : public Reader {
+ public:
+  FastReader(const Topic& topic, dds::Subscriber& subscriber, dds::DataReader& reader, ReaderEvents& events)
+      : topic_(topic), subscriber_(subscriber), reader_(reader), events_(events) {}
+  ~FastReader() override {
+    reader_.set_listener(nullptr);
+    subscriber_.delete_datareader(&reader_);
+  }
+
+  bool take(Payload& payload) override {
+    RawSample sample{{}, &payload, 0};
+    dds::SampleInfo info;
+    while (reader_.take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+      if (!info.valid_data) continue;  // an instance's state changed
+      const bool good = sample.size == payload.size() && acceptable(payload, topic_);
+      ++(good ? samples_ : refused_);
+      if (good) return true;
+    }
+    return false;
+  }
+  int matched() const override { return events_.matched; }
+  Counters counters() const override { return {samples_, events_.lost, refused_, events_.incompatible}; }
+
+ private:
+  const Topic& topic_;
+  dds::Subscriber& subscriber_;
+  dds::DataReader& reader_;
+  ReaderEvents& events_;
+  std::uint64_t samples_ = 0, refused_ = 0;
+};
+
+template <class T>
+T& checked(T* made, const char* what, const Topic& topic) {
+  if (made == nullptr)
+    throw std::runtime_error("Fast DDS refused to create a " + std::string(what) + " for topic " +
+                             std::string(topic.name));
+  return *made;
+}
+
+class FastNode final : public Node {
+ public:
+  explicit FastNode(const NodeOptions& options) : options_(options) {}
+  ~FastNode() override {
+    if (participant_ == nullptr) return;
+    participant_->delete_contained_entities();
+    dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+  }
+
+  /// False when Fast DDS refuses.
+  bool start(const dds::DomainParticipantQos& qos) {
+    auto* factory = dds::DomainParticipantFactory::get_instance();
+    participant_ = factory->create_participant(options_.domain, qos);
+    if (participant_ == nullptr) return false;
+    publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
+    subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
+    return publisher_ != nullptr && subscriber_ != nullptr;
+  }
+
+  std::unique_ptr<Writer> writer(const Topic& topic) override {
+    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, options_, true));
+    auto& made = checked(publisher_->create_datawriter(&topic_for(topic), writer_qos(topic), &events),
+                         "writer", topic);
+    return std::make_unique<FastWriter>(topic, *publisher_, made, events);
+  }
+
+  std::unique_ptr<Reader> reader(const Topic& topic) override {
+    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, options_, notifier_));
+    const auto qos = common_qos<dds::DataReaderQos>(topic);
+    auto& made = checked(subscriber_->create_datareader(&topic_for(topic), qos, &events), "reader", topic);
+    return std::make_unique<FastReader>(topic, *subscriber_, made, events);
+  }
+
+  bool wait(std::chrono::steady_clock::time_point deadline) override { return notifier_.wait(deadline); }
+  void wake() noexcept override { notifier_.notify(); }
+  const NodeOptions& options() const override { return options_; }
+
+ private:
+  template <class T>
+  static T& keep(std::vector<std::unique_ptr<T>>& all, std::unique_ptr<T> one) {
+    all.push_back(std::move(one));
+    return *all.back();
+  }
+
+  dds::Topic& topic_for(const Topic& topic) {
+    dds::Topic*& made = topics_[topic.name];
+    if (made == nullptr) {
+      const dds::TypeSupport type(new PassThroughType(topic));
+      type.register_type(participant_);
+      made =
+          participant_->create_topic(std::string(topic.name), type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+    }
+    return checked(made, "topic", topic);
+  }
+
+  const NodeOptions options_;
+  Notifier notifier_;
+  std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
+  std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
+  std::map<std::string_view, dds::Topic*> topics_;
+  dds::DomainParticipant* participant_ = nullptr;
+  dds::Publisher* publisher_ = nullptr;
+  dds::Subscriber* subscriber_ = nullptr;
+};
+
+rtps::Locator_t locator(const std::string& address, int port) {
+  rtps::Locator_t l;
+  l.kind = LOCATOR_KIND_UDPv4;
+  rtps::IPLocator::setIPv4(l, address);
+  l.port = static_cast<std::uint32_t>(port);
+  return l;
+}
+
+/// A prefix nobody had before, not even a process with our number on a host with our address (containers):
+/// peers take a restarted process for a new one at once.  Bytes 0 and 1 name the vendor.
+rtps::GuidPrefix_t random_prefix() {
+  rtps::GuidPrefix_t prefix;
+  std::random_device device;
+  prefix.value[0] = 0x01, prefix.value[1] = 0x0f;
+  for (unsigned i = 2; i < rtps::GuidPrefix_t::size; ++i)
+    prefix.value[i] = static_cast<rtps::octet>(device());
+  return prefix;
+}
+
+dds::DomainParticipantQos participant_qos(const NodeOptions& options, const Interface& interface, int index) {
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = {interface.address};
+  udp->maxInitialPeersRange = kMaxParticipantIndex + 1;
+  udp->receiveBufferSize = 4 << 20;  // the kernel cuts it to its own limit
+  dds::DomainParticipantQos qos;
+  qos.name(options.name);
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(udp);
+  auto& wire = qos.wire_protocol();
+  wire.prefix = random_prefix();
+  wire.builtin.discovery_config.leaseDuration = duration(kLease);
+  wire.builtin.discovery_config.leaseDuration_announcementperiod = duration(kAnnouncement);
+  // Ports by hand: Fast DDS's own participant numbers are unique in a process, not in a domain.
+  wire.builtin.metatrafficUnicastLocatorList.push_back(
+      locator(interface.address, metatraffic_port(options.domain, index)));
+  wire.default_unicast_locator_list.push_back(locator(interface.address, user_port(options.domain, index)));
+  const auto peers = unicast_peers(options, interface);
+  for (const std::string& peer : peers) wire.builtin.initialPeersList.push_back(locator(peer, 0));
+  if (peers.empty())
+    wire.builtin.metatrafficMulticastLocatorList.push_back(
+        locator("239.255.0.1", multicast_port(options.domain)));
+  return qos;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Node>, Problem> open_fastdds(const NodeOptions& options) {
+  const auto interface = find_interface(options.interface_name);
+  if (!interface) return interface.error();
+  if (const auto peers = check_peers(options.peers); !peers) return peers.error();
+  const auto index = free_participant_index(options.domain);
+  if (!index) return index.error();
+  auto node = std::make_unique<FastNode>(options);
+  if (!node->start(participant_qos(options, interface.value(), index.value())))
+    return Problem{"domain", "= " + std::to_string(options.domain) + ", Fast DDS refuses to join it on " +
+                                 interface.value().address};
+  return std::unique_ptr<Node>(std::move(node));
+}
+
+}  // namespace hamel::bus

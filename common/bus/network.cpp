@@ -1,0 +1,136 @@
+#include "common/bus/network.h"
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+#include <system_error>
+#include <variant>
+
+namespace hamel::bus {
+namespace {
+
+struct Candidate {
+  Interface interface;
+  bool up = false;
+};
+
+/// Every interface, those without an IPv4 address too, in the kernel's order; one entry for each address.
+std::vector<Candidate> candidates() {
+  std::vector<Candidate> found;
+  ifaddrs* list = nullptr;
+  if (getifaddrs(&list) != 0) return found;
+  for (const ifaddrs* i = list; i != nullptr; i = i->ifa_next) {
+    const bool ipv4 = i->ifa_addr != nullptr && i->ifa_addr->sa_family == AF_INET;
+    const bool link = i->ifa_addr == nullptr || i->ifa_addr->sa_family == AF_PACKET;
+    if (!ipv4 && !link) continue;
+    Candidate c;
+    c.interface.name = i->ifa_name;
+    c.interface.loopback = (i->ifa_flags & IFF_LOOPBACK) != 0;
+    c.interface.multicast = (i->ifa_flags & IFF_MULTICAST) != 0;
+    c.up = (i->ifa_flags & IFF_UP) != 0;
+    char text[INET_ADDRSTRLEN] = "";
+    if (ipv4)
+      inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(i->ifa_addr)->sin_addr, text, sizeof text);
+    c.interface.address = text;
+    found.push_back(std::move(c));
+  }
+  freeifaddrs(list);
+  return found;
+}
+
+std::string names_of(const std::vector<Candidate>& all) {
+  std::string names;
+  for (const Candidate& c : all) {
+    if (c.interface.address.empty()) continue;
+    names += (names.empty() ? "" : ", ") + c.interface.name + " (" + c.interface.address + ")";
+  }
+  return names.empty() ? "none" : names;
+}
+
+bool port_is_free(int port) {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return false;
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_ANY);
+  const bool bound = bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  close(fd);
+  return bound;
+}
+
+bool is_ipv4(const std::string& text) {
+  in_addr parsed;
+  return inet_pton(AF_INET, text.c_str(), &parsed) == 1;
+}
+
+}  // namespace
+
+Result<Interface, Problem> find_interface(const std::string& name_or_address) {
+  const auto all = candidates();
+  const auto asked_for = [&](const Candidate& c) {
+    if (name_or_address.empty()) return c.interface.loopback;
+    return c.interface.name == name_or_address || c.interface.address == name_or_address;
+  };
+  const std::string asked = name_or_address.empty() ? "loopback" : name_or_address;
+  bool exists = false, up = false;
+  for (const Candidate& c : all) {
+    if (!asked_for(c)) continue;
+    exists = true;
+    up = up || c.up;
+    if (c.up && !c.interface.address.empty()) return c.interface;
+  }
+  if (!exists) return Problem{"interface", "= " + asked + ", does not exist; there are: " + names_of(all)};
+  if (!up) return Problem{"interface", "= " + asked + ", is down"};
+  return Problem{"interface", "= " + asked + ", has no IPv4 address"};
+}
+
+Result<std::monostate, Problem> check_peers(const std::vector<std::string>& peers) {
+  for (const std::string& peer : peers)
+    if (!is_ipv4(peer)) return Problem{"peers", "= " + peer + ", must be an IPv4 address"};
+  return std::monostate{};
+}
+
+std::vector<std::string> unicast_peers(const NodeOptions& options, const Interface& interface) {
+  if (options.peers.empty() && interface.multicast && !interface.loopback) return {};
+  std::vector<std::string> peers = options.peers;
+  if (std::find(peers.begin(), peers.end(), interface.address) == peers.end())
+    peers.push_back(interface.address);
+  return peers;
+}
+
+Result<int, Problem> free_participant_index(std::uint32_t domain) {
+  for (int index = 0; index <= kMaxParticipantIndex; ++index)
+    if (port_is_free(metatraffic_port(domain, index)) && port_is_free(user_port(domain, index))) return index;
+  return Problem{"domain", "= " + std::to_string(domain) + ", has no free participant index: UDP ports " +
+                               std::to_string(metatraffic_port(domain, 0)) + ".." +
+                               std::to_string(user_port(domain, kMaxParticipantIndex)) +
+                               " of this host are taken"};
+}
+
+const char* policy_name(int id) {
+  static const std::map<int, const char*> names{
+      {2, "durability"},     {3, "presentation"},        {4, "deadline"},
+      {5, "latency budget"}, {6, "ownership"},           {8, "liveliness"},
+      {10, "partition"},     {11, "reliability"},        {12, "destination order"},
+      {13, "history"},       {23, "data representation"}};
+  const auto name = names.find(id);
+  return name == names.end() ? "an unnamed policy" : name->second;
+}
+
+std::string incompatible_sentence(const Topic& topic, bool we_write, int policy, Vendor vendor) {
+  const std::string ours = std::string(we_write ? "our writer offers" : "our reader asks for") +
+                           " reliable, " +
+                           (topic.delivery == Delivery::latched ? "transient-local" : "volatile");
+  const std::string theirs = we_write ? "a peer's reader asks for more" : "a peer's writer offers less";
+  return "topic " + std::string(topic.name) + " (" + to_string(vendor) + "): QoS " + policy_name(policy) +
+         " does not match: " + ours + ", " + theirs + "; no data flows between the two";
+}
+
+}  // namespace hamel::bus

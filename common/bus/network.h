@@ -1,0 +1,51 @@
+#pragma once
+/// What both vendors need to know about this host's network before they start.  Private to common/bus.
+
+#include <string>
+
+#include "common/bus/bus.h"
+
+namespace hamel::bus {
+
+/// Participants on one host and domain take the indices 0..kMaxParticipantIndex; unicast discovery asks them
+/// all.
+inline constexpr int kMaxParticipantIndex = 49;
+
+/// A participant that fell silent is gone after this; its peers hear from it several times within.
+inline constexpr std::chrono::milliseconds kLease{3000}, kAnnouncement{800};
+
+/// Instances of one topic that a reader keeps, so that a stranger cannot fill the memory with new keys.
+inline constexpr int kMaxInstances = 64;
+
+struct Interface {
+  std::string name, address;  ///< IPv4, dotted
+  bool loopback = false, multicast = false;
+};
+
+/// By name or IPv4 address; empty: the loopback.  Says so when there is none, it is down, or has no IPv4
+/// address.
+Result<Interface, Problem> find_interface(const std::string& name_or_address);
+
+/// Every peer an IPv4 address?
+Result<std::monostate, Problem> check_peers(const std::vector<std::string>& peers);
+
+/// Where discovery is sent: the peers, then this host (other participants here).  Empty: by multicast.
+std::vector<std::string> unicast_peers(const NodeOptions& options, const Interface& interface);
+
+/// RTPS 9.6.1.1: where everybody is looked for, and the two unicast ports of a participant.
+constexpr int multicast_port(std::uint32_t domain) { return 7400 + 250 * static_cast<int>(domain); }
+constexpr int metatraffic_port(std::uint32_t domain, int index) {
+  return multicast_port(domain) + 10 + 2 * index;
+}
+constexpr int user_port(std::uint32_t domain, int index) { return metatraffic_port(domain, index) + 1; }
+
+/// The first participant index of `domain` whose ports nobody on this host has bound.
+Result<int, Problem> free_participant_index(std::uint32_t domain);
+
+/// The QoS a peer may disagree with, by its number in the DDS specification.
+const char* policy_name(int id);
+
+/// One sentence for a user: which topic, which policy, both sides.
+std::string incompatible_sentence(const Topic& topic, bool we_write, int policy, Vendor vendor);
+
+}  // namespace hamel::bus

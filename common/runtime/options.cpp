@@ -1,0 +1,83 @@
+#include "common/runtime/options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "common/files/scene_text.h"
+#include "common/wire/codec.h"
+
+namespace hamel::runtime {
+
+void add_bus_options(CLI::App& app, BusOptions& o) {
+  app.add_option("--bus", o.vendor, "inproc, fastdds or cyclonedds")->type_name("VENDOR");
+  app.add_option("--domain", o.domain, "DDS domain, 0..232")->capture_default_str();
+  app.add_option("--interface", o.interface_name, "network interface or address; loopback only unless named");
+  app.add_option("--peer", o.peers, "unicast address of a peer host; repeat")->type_name("ADDRESS");
+}
+
+void add_run_options(CLI::App& app, RunOptions& o) {
+  app.add_option("scene", o.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
+  app.add_option("--set", o.overrides, "override a field of the scene, e.g. planner.method=gyro; repeat")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  auto* l = app.add_flag("--lockstep", o.lockstep, "deterministic: each step waits for its command, as fast as it can");
+  auto* r = app.add_flag("--realtime", o.realtime, "paced by the clock: latest command, stale input is a named state");
+  l->excludes(r);
+  app.add_option("--duration", o.duration_s, "seconds of simulated time instead of the scene's")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  app.add_option("--state-dir", o.state_dir, "folder of the checkpoints that a restart resumes from");
+  app.add_flag("-v,--verbose", o.verbose, "log more");
+  add_bus_options(app, o.bus);
+}
+
+Checked<scene::Scene> load(const RunOptions& o) {
+  auto s = files::load_scene(o.scene_path, o.overrides);
+  if (s && o.duration_s > 0) s.value().duration_s = o.duration_s;
+  return s;
+}
+
+scene::Pace pace(const RunOptions& o, scene::Pace otherwise) {
+  if (o.lockstep) return scene::Pace::lockstep;
+  if (o.realtime) return scene::Pace::realtime;
+  return otherwise;
+}
+
+Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const std::string& scene_vendor,
+                                                      const std::string& name) {
+  const std::string asked = !o.vendor.empty() ? o.vendor : scene_vendor;
+  bus::NodeOptions n;
+  n.vendor = bus::kDefaultNetworkVendor;
+  if (!asked.empty()) {
+    const auto vendor = bus::vendor_from(asked);
+    if (!vendor) return vendor.error();
+    n.vendor = vendor.value();
+  }
+  n.domain = o.domain;
+  n.interface_name = o.interface_name;
+  n.peers = o.peers;
+  n.name = name;
+  return bus::open(n);
+}
+
+int complain(const std::string& program, const Problems& problems) {
+  for (const auto& p : problems) fmt::print(stderr, "{}: {}\n", program, to_string(p));
+  return kBadInput;
+}
+
+std::optional<int> parse(CLI::App& app, int argc, char** argv) {
+  app.set_version_flag("--version", version());
+  try {
+    app.parse(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::ParseError& e) {
+    const int code = app.exit(e);
+    return code == 0 ? kDone : kBadInput;
+  }
+}
+
+std::string version() { return fmt::format("hamel {} (idl {})", HAMEL_VERSION, wire::idl_hash()); }
+
+}  // namespace hamel::runtime

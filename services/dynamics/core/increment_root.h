@@ -1,0 +1,107 @@
+#pragma once
+/// Finding the joint increments d = q^{k+1} - q^k of an implicit step: first guess, iteration, when to stop.
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "services/dynamics/core/node.h"
+#include "services/dynamics/core/tier.h"
+
+namespace hamel::dynamics {
+
+/// The last increments, newest first, as they lie in State::history: [count, h, d_k (n), d_{k-1} (n), ...].
+/// They serve only steps of the same length h.
+class IncrementHistory {
+ public:
+  static constexpr int kDepth = 4;
+  static std::size_t size(int n) noexcept { return 2 + static_cast<std::size_t>(kDepth * n); }
+
+  /// First guess of d: the polynomial through the last increments; h qd while there are none.
+  static void guess(const Node& from, double h, VectorXd& d) noexcept {
+    const auto& s = from.history;
+    const Eigen::Index n = d.size();
+    const int count = s[1] == h ? static_cast<int>(s[0]) : 0;
+    const auto past = [&](int k) { return Eigen::Map<const VectorXd>(s.data() + 2 + k * n, n); };
+    switch (count) {
+      case 0:
+        d = h * from.qd;
+        break;
+      case 1:
+        d = 2 * h * from.qd - past(0);
+        break;  // qd is between the two increments
+      case 2:
+        d = 2 * past(0) - past(1);
+        break;
+      case 3:
+        d = 3 * past(0) - 3 * past(1) + past(2);
+        break;
+      default:
+        d = 4 * past(0) - 6 * past(1) + 4 * past(2) - past(3);
+    }
+  }
+
+  /// Puts d in front of from's history and writes it to `to`.
+  static void push(const Node& from, double h, const VectorXd& d, Node& to) noexcept {
+    const auto& s = from.history;
+    const Eigen::Index n = d.size();
+    const double count = s[1] == h ? s[0] : 0;
+    to.history[0] = std::min<double>(count + 1, kDepth);
+    to.history[1] = h;
+    std::copy(s.begin() + 2, s.end() - n, to.history.begin() + 2 + n);
+    Eigen::Map<VectorXd>(to.history.data() + 2, n) = d;
+  }
+};
+
+/// Residual of one evaluation.
+struct Residual {
+  double torque_Nm = 0;  ///< largest |tau_e|
+  double relative = 0;   ///< the same against the momenta and torques that make it up
+};
+
+/// Relative residual that counts as rounding: reached, the iteration stops.
+inline constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
+/// Relative residual below which one look without progress means that rounding is reached ...
+inline constexpr double kFloor = 1e-12;
+/// ... and below which several in a row do: slow convergence is not stagnation.
+inline constexpr double kHighFloor = 1e-9;
+inline constexpr int kPatience = 3;
+/// Growth over the first residual that means divergence.
+inline constexpr double kGrowth = 1e6;
+
+/// Updates d until the equation holds.  Equation: Residual evaluate(d), void correct(d) (d -= J^-1 r).
+/// The last call to evaluate() is at the d that is returned.
+template <class Equation>
+StepReport find_root(Equation& equation, const Options& options, VectorXd& d) noexcept {
+  StepReport report;
+  double first = 0, best = std::numeric_limits<double>::infinity();
+  int since_best = 0;
+  for (;;) {
+    const Residual r = equation.evaluate(d);
+    ++report.evaluations;
+    report.residual_Nm = r.torque_Nm;
+    if (!std::isfinite(r.torque_Nm) || !std::isfinite(r.relative)) return report;
+    if (options.tolerance_Nm > 0 ? r.torque_Nm < options.tolerance_Nm : r.relative <= kRounding) {
+      report.stop = Stop::converged;
+      return report;
+    }
+    since_best = r.relative < best ? 0 : since_best + 1;
+    if ((r.relative < kFloor && r.relative > 0.5 * best) ||
+        (r.relative < kHighFloor && since_best >= kPatience)) {
+      report.stop = Stop::stagnated;
+      return report;
+    }
+    if (report.evaluations == 1) first = r.relative;
+    if (r.relative > kGrowth * first) return report;
+    if (report.iterations == options.max_iterations) {
+      report.stop = Stop::budget_spent;
+      return report;
+    }
+    best = std::min(best, r.relative);
+    equation.correct(d);
+    ++report.iterations;
+  }
+}
+
+}  // namespace hamel::dynamics

@@ -1,0 +1,376 @@
+#include "services/dynamics/service.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/runtime/options.h"
+#include "services/dynamics/convert.h"
+
+namespace hamel::dynamics {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr std::uint32_t kCheckpointKind = 0x0101;  // dynamics, layout 1
+constexpr auto kRepeat = 100ms;                    // lockstep: say it again to peers that came late
+constexpr int kBurst = 64;                         // steps before the other services of the process get their turn
+
+runtime::Clock::duration seconds(double s) {
+  return std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(s));
+}
+
+/// FNV-1a of what a checkpoint must agree with: the scene as it was loaded.
+std::uint64_t fingerprint(const scene::Scene& s) {
+  std::uint64_t h = 1469598103934665603ull;
+  for (const char c : s.text + '\0' + s.robot.urdf) h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return h;
+}
+
+/// A fresh start must not be taken for the continuation of an earlier run of this arm.
+std::uint64_t fresh_incarnation(scene::Pace pace) {
+  if (pace == scene::Pace::lockstep) return 1;
+  const auto since = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since).count());
+}
+
+}  // namespace
+
+const char* to_string(Outcome v) {
+  switch (v) {
+    case Outcome::running: return "running";
+    case Outcome::done: return "done";
+    case Outcome::no_command: return "no_command";
+    case Outcome::diverged: return "diverged";
+  }
+  return "?";
+}
+
+Result<std::unique_ptr<DynamicsService>, Problem> DynamicsService::make(bus::Node& node, const scene::Scene& scene,
+                                                                        const ServiceConfig& config) {
+  std::unique_ptr<DynamicsService> s(new DynamicsService(node, scene, config));
+  if (config.state_dir.empty()) return s;
+  const std::string path = config.state_dir + "/dynamics-" + std::to_string(scene.arm) + ".checkpoint";
+  auto c = runtime::Checkpoint::open(path, kCheckpointKind, 4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512);
+  if (!c) return c.error();
+  s->checkpoint_ = std::move(c).value();
+  std::string note;
+  const auto bytes = s->checkpoint_->load(note);
+  if (!note.empty()) spdlog::warn("{}: {}", path, note);
+  if (!bytes.empty() && s->load(bytes))
+    spdlog::info("resumed at step {} (t = {:.3f} s)", s->arm_.state().step, s->arm_.t_s());
+  else if (!bytes.empty())
+    spdlog::warn("{}: of another scene or version, refused; starting afresh", path);
+  return s;
+}
+
+DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, const ServiceConfig& config)
+    : scene_(scene),
+      config_(config),
+      arm_(scene_),
+      fingerprint_(fingerprint(scene)),
+      incarnation_(fresh_incarnation(config.pace)),
+      state_out_(node),
+      clock_out_(node),
+      summary_out_(node),
+      status_out_(node),
+      robot_out_(node),
+      command_in_(node),
+      mode_in_(node),
+      bus_name_(bus::to_string(node.options().vendor)) {
+  const double dt = scene.dynamics.dt_s;
+  last_step_ = static_cast<std::uint64_t>(std::llround(scene.duration_s / dt));
+  clock_every_ = static_cast<std::uint64_t>(std::max(1.0, std::floor(0.01 / dt + 1e-9)));
+  command_ = Eigen::VectorXd::Zero(scene.robot.chain.n());
+  hash_.add(arm_.state().step, arm_.state().q, arm_.state().p);
+}
+
+bool DynamicsService::at_end() const { return !config_.endless && arm_.state().step >= last_step_; }
+
+bool DynamicsService::poll(Time now) {
+  if (finished()) return false;
+  if (!started_) {
+    started_ = true;
+    next_step_ = waiting_since_ = last_publish_ = now;
+    wire::RobotDescription d;
+    d.arm = scene_.arm;
+    d.name = scene_.robot.name;
+    d.urdf = scene_.robot.urdf;
+    d.effort_limits.resize(arm_.state().q.size());
+    for (int i = 0; i < scene_.robot.chain.n(); ++i) d.effort_limits[i] = scene_.robot.chain.joint(i).limits.effort;
+    robot_out_.publish(d);
+    publish_clock(true);
+    publish_state();
+  }
+  take_modes();
+  take_commands();
+  const bool progressed = config_.pace == scene::Pace::lockstep ? poll_lockstep(now) : poll_realtime(now);
+  publish_periodic(now);
+  return progressed;
+}
+
+runtime::Clock::time_point DynamicsService::due() const {
+  if (config_.pace == scene::Pace::realtime) return next_step_;
+  return last_publish_ + kRepeat;
+}
+
+void DynamicsService::take_modes() {
+  wire::ModeCommand m;
+  while (mode_in_.take(m)) {
+    if (m.arm != scene_.arm || m.id <= mode_id_) continue;
+    mode_id_ = m.id;
+    spdlog::info("mode: {}", wire::to_string(m.mode));
+    if (m.mode == wire::Mode::stop || m.mode == wire::Mode::hold) mode_ = m.mode;
+    if (m.mode == wire::Mode::resume) mode_.reset();
+  }
+}
+
+void DynamicsService::take_commands() {
+  while (command_in_.take(incoming_)) {
+    if (incoming_.arm != scene_.arm) continue;
+    if (!accept(incoming_)) {
+      ++commands_refused_;
+      continue;
+    }
+    command_ = incoming_.torque;
+    command_step_ = incoming_.step;
+    command_includes_gravity_ = incoming_.includes_gravity;
+    planner_state_ = incoming_.planner_state;
+    epoch_ = incoming_.epoch;
+    state_.caused_by.size = 0;
+    state_.caused_by.add(wire::ServiceKind::planner, incoming_.step);
+  }
+}
+
+/// A command must be of our size, answer a state of this incarnation that was published, be newer than the one
+/// that holds, and come from the planner with the largest epoch.
+bool DynamicsService::accept(const wire::TorqueCommand& c) {
+  if (c.torque.size() != command_.size()) {
+    if (refusals_(runtime::Clock::now()))
+      spdlog::warn("command for {} joints refused: arm {} has {}", c.torque.size(), scene_.arm, command_.size());
+    return false;
+  }
+  if (c.state_incarnation != incarnation_ || c.step > arm_.state().step || c.epoch < epoch_) return false;
+  return !command_step_ || c.step > *command_step_;
+}
+
+bool DynamicsService::awaits_command() const {
+  if (!scene_.steered) return false;
+  const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
+  const std::uint64_t boundary = arm_.state().step / period * period;
+  return !command_step_ || *command_step_ < boundary;
+}
+
+bool DynamicsService::poll_lockstep(Time now) {
+  bool progressed = false;
+  for (int i = 0; i < kBurst; ++i) {
+    if (at_end()) {
+      end(Outcome::done, "end of the run");
+      return true;
+    }
+    if (awaits_command()) break;
+    if (scene_.stop == scene::StopRule::when_reached && planner_state_ == wire::PlannerState::reached) {
+      end(Outcome::done, "target reached");
+      return true;
+    }
+    if (!step()) return true;
+    last_publish_ = waiting_since_ = now;
+    progressed = true;
+  }
+  if (progressed) return true;
+  if (now - waiting_since_ > config_.patience) {
+    end(Outcome::no_command, fmt::format("no planner answered step {} within {} s", arm_.state().step,
+                                         std::chrono::duration<double>(config_.patience).count()));
+    return true;
+  }
+  if (now - last_publish_ >= kRepeat) {
+    last_publish_ = now;
+    publish_clock(true);
+    publish_state();
+  }
+  return false;
+}
+
+bool DynamicsService::poll_realtime(Time now) {
+  if (now < next_step_) return false;
+  count_lateness(now);
+  for (int i = 0; i < 8 && now >= next_step_; ++i) {
+    const bool reached = scene_.stop == scene::StopRule::when_reached && planner_state_ == wire::PlannerState::reached;
+    if (at_end() || (reached && !config_.endless)) {
+      end(Outcome::done, reached ? "target reached" : "end of the run");
+      return true;
+    }
+    if (!step()) return true;
+    next_step_ += seconds(scene_.dynamics.dt_s);
+  }
+  return true;
+}
+
+void DynamicsService::count_lateness(Time now) {
+  const auto dt = seconds(scene_.dynamics.dt_s);
+  if (now - next_step_ < dt) return;
+  deadlines_missed_ += static_cast<std::uint64_t>((now - next_step_) / dt);
+  // Up to 8 periods are caught up; more than that is given up, not run in a burst.
+  if (now - next_step_ > 8 * dt) next_step_ = now;
+}
+
+/// Mode commands outrank the planner; a planner that is silent or absent leaves the arm holding still.
+Drive DynamicsService::choose_drive() {
+  if (mode_) {
+    const bool stop = *mode_ == wire::Mode::stop;
+    validity_ = stop ? wire::Validity::stopped : wire::Validity::holding;
+    return {.kind = stop ? DriveKind::brake : DriveKind::hold};
+  }
+  if (!scene_.steered) {
+    validity_ = wire::Validity::valid;
+    return {.kind = DriveKind::free};
+  }
+  if (!command_step_) {
+    validity_ = wire::Validity::holding;
+    return {.kind = DriveKind::hold};
+  }
+  const double age_s = static_cast<double>(arm_.state().step - *command_step_) * scene_.dynamics.dt_s;
+  const double stale_s = std::max(std::chrono::duration<double>(topics::kCommand.stale).count(),
+                                  3 * scene_.planner.period_steps * scene_.dynamics.dt_s);
+  if (config_.pace == scene::Pace::realtime && age_s > stale_s) {
+    ++commands_missed_;
+    validity_ = wire::Validity::command_stale;
+    return {.kind = DriveKind::hold};
+  }
+  validity_ = wire::Validity::valid;
+  return {.kind = DriveKind::torque, .torque_Nm = &command_, .includes_gravity = command_includes_gravity_};
+}
+
+bool DynamicsService::step() {
+  if (!arm_.advance(choose_drive())) {
+    validity_ = wire::Validity::diverged;
+    publish_state();
+    end(Outcome::diverged, fmt::format("no usable step at t = {:.6f} s: {} iterations left {} N m; a smaller dt_s may help",
+                                       arm_.t_s(), arm_.report().iterations, arm_.report().residual_Nm));
+    return false;
+  }
+  hash_.add(arm_.state().step, arm_.state().q, arm_.state().p);
+  save();
+  if (arm_.state().step % clock_every_ == 0) publish_clock(true);
+  publish_state();
+  return true;
+}
+
+void DynamicsService::publish_state() {
+  state_.arm = scene_.arm;
+  state_.incarnation = incarnation_;
+  state_.validity = validity_;
+  to_wire(arm_, state_);
+  state_out_.publish(state_);
+}
+
+void DynamicsService::publish_clock(bool running) {
+  wire::SimulationClock c;
+  c.arm = scene_.arm;
+  c.incarnation = incarnation_;
+  c.step = arm_.state().step;
+  c.t_s = arm_.t_s();
+  c.dt_s = scene_.dynamics.dt_s;
+  c.pace = config_.pace == scene::Pace::lockstep ? wire::Pace::lockstep : wire::Pace::realtime;
+  c.running = running;
+  clock_out_.publish(c);
+}
+
+void DynamicsService::publish_summary(bool final_summary) {
+  wire::RunSummary s;
+  s.arm = scene_.arm;
+  s.incarnation = incarnation_;
+  s.final_summary = final_summary;
+  s.outcome = to_string(outcome_);
+  to_wire(arm_, s);
+  s.commands_missed = commands_missed_;
+  s.deadlines_missed = deadlines_missed_;
+  s.trajectory_hash = hash_.hex();
+  summary_out_.publish(s);
+}
+
+void DynamicsService::publish_status(wire::ServiceState state) {
+  wire::ServiceStatus s;
+  s.kind = wire::ServiceKind::dynamics;
+  s.arm = scene_.arm;
+  s.incarnation = incarnation_;
+  s.version = runtime::version();
+  s.idl_hash = wire::idl_hash();
+  s.bus = bus_name_;
+  s.state = state;
+  s.detail = finished() ? to_string(outcome_) : wire::to_string(validity_);
+  s.counters = {{"steps", arm_.state().step},
+                {"commands_refused", commands_refused_},
+                {"commands_missed", commands_missed_},
+                {"deadlines_missed", deadlines_missed_},
+                {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}};
+  status_out_.publish(s);
+}
+
+void DynamicsService::publish_periodic(Time now) {
+  if (now - last_status_ >= 500ms) {
+    last_status_ = now;
+    publish_status(wire::ServiceState::ready);
+    publish_summary(finished());
+  }
+  if (checkpoint_ && now - last_sync_ >= 1s) {
+    last_sync_ = now;
+    checkpoint_->sync();
+  }
+}
+
+void DynamicsService::end(Outcome outcome, const std::string& why) {
+  outcome_ = outcome;
+  if (outcome == Outcome::done)
+    spdlog::debug("{}", why);
+  else
+    spdlog::error("{}", why);
+  publish_clock(false);
+  publish_summary(true);
+}
+
+void DynamicsService::close() {
+  publish_clock(false);
+  publish_summary(true);
+  publish_status(wire::ServiceState::stopping);
+}
+
+void DynamicsService::save() {
+  if (!checkpoint_) return;
+  runtime::Packer p(packed_);
+  const State& s = arm_.state();
+  p.put(fingerprint_);
+  p.put(incarnation_);
+  p.put(s.step);
+  p.put(s.q.data(), static_cast<std::size_t>(s.q.size()));
+  p.put(s.p.data(), static_cast<std::size_t>(s.p.size()));
+  p.put(s.qd.data(), static_cast<std::size_t>(s.qd.size()));
+  p.put(s.history.data(), s.history.size());
+  p.put(arm_.books());
+  p.put(hash_.digest());
+  p.put(mode_.has_value() ? static_cast<std::int32_t>(*mode_) : -1);
+  p.put(mode_id_);
+  checkpoint_->save(packed_);
+}
+
+bool DynamicsService::load(std::span<const std::byte> bytes) {
+  runtime::Unpacker u(bytes);
+  std::uint64_t print = 0, incarnation = 0, mode_id = 0;
+  State s;
+  Books books;
+  TrajectoryHash::Digest digest;
+  std::int32_t mode = -1;
+  const bool whole = u.get(print) && u.get(incarnation) && u.get(s.step) && u.get_doubles(s.q) && u.get_doubles(s.p) &&
+                     u.get_doubles(s.qd) && u.get_doubles(s.history) && u.get(books) && u.get(digest) && u.get(mode) &&
+                     u.get(mode_id) && u.at_end();
+  const Eigen::Index n = arm_.state().q.size();
+  if (!whole || print != fingerprint_ || s.q.size() != n || s.p.size() != n || s.qd.size() != n) return false;
+  incarnation_ = incarnation;
+  arm_.restore(s, books);
+  hash_.restore(digest);
+  if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
+  mode_id_ = mode_id;
+  return true;
+}
+
+}  // namespace hamel::dynamics

@@ -1,0 +1,124 @@
+#include "services/perception/service.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/runtime/options.h"
+#include "services/perception/convert.h"
+
+namespace hamel::perception {
+
+using namespace std::chrono_literals;
+
+namespace {
+constexpr std::uint64_t kNever = ~std::uint64_t{0};
+}  // namespace
+
+Checked<std::unique_ptr<PerceptionService>> PerceptionService::make(bus::Node& node, const scene::Scene& scene) {
+  auto source = Source::make(scene.perception);
+  if (!source) return source.error();
+  return std::unique_ptr<PerceptionService>(new PerceptionService(node, scene, std::move(source).value()));
+}
+
+PerceptionService::PerceptionService(bus::Node& node, const scene::Scene& scene, Source source)
+    : arm_(scene.arm),
+      source_(std::move(source)),
+      sets_out_(node),
+      status_out_(node),
+      clock_in_(node),
+      bus_name_(bus::to_string(node.options().vendor)) {
+  set_.source = scene.arm;
+  set_.incarnation = 1;
+}
+
+bool PerceptionService::poll(Time now) {
+  const bool heard = hear_clock(now);
+  bool published = false;
+  if (clock_ && clock_->running) {
+    if (clock_->pace == wire::Pace::lockstep) {
+      // One clock message ahead: the next comes after 10 ms of the run, or after one step where that is longer.
+      if (heard) published = publish_until(clock_->t_s + std::max(0.01, clock_->dt_s));
+    } else {
+      published = publish_until(run_time_s(now));
+    }
+  }
+  if (now - last_status_ >= 500ms) publish_status(now, wire::ServiceState::ready);
+  return heard || published;
+}
+
+/// Newest clock message; a repeated one asks for the sets of its time again, a new incarnation starts anew.
+bool PerceptionService::hear_clock(Time now) {
+  bool heard = false;
+  wire::SimulationClock c;
+  while (clock_in_.take(c)) {
+    if (c.arm != arm_) continue;
+    const bool again = clock_ && c.incarnation == clock_->incarnation && c.step == clock_->step && c.running;
+    const bool anew = !clock_ || c.incarnation != clock_->incarnation || c.step < clock_->step;
+    if (again) ++repeated_;
+    if (again || anew) next_.reset();
+    clock_ = c;
+    clock_heard_ = now;
+    heard = true;
+  }
+  return heard;
+}
+
+/// The run's time now, carried on from the last clock message for as long as that is not stale.
+double PerceptionService::run_time_s(Time now) const {
+  const double since_s = std::chrono::duration<double>(now - clock_heard_).count();
+  const double stale_s = std::chrono::duration<double>(topics::kClock.stale).count();
+  return clock_->t_s + (since_s < stale_s ? since_s : 0);
+}
+
+bool PerceptionService::publish_until(double t_s) {
+  const bool lockstep = clock_->pace == wire::Pace::lockstep;
+  const auto number_at = [this](double t) {
+    return static_cast<std::uint64_t>(std::floor(std::max(0.0, t) / source_.period_s() + 1e-9));
+  };
+  if (!next_) next_ = number_at(clock_->t_s);
+  // A long silence is skipped in real time, not made up for in a burst.
+  if (!lockstep && number_at(t_s) > *next_ + 4) next_ = number_at(t_s);
+  bool any = false;
+  while (*next_ != kNever && static_cast<double>(*next_) * source_.period_s() <= t_s) {
+    if (to_wire(source_, *next_, lockstep, set_)) {
+      sets_out_.publish(set_);
+      ++published_;
+      any = true;
+    }
+    next_ = lockstep ? after(*next_) : *next_ + 1;
+  }
+  return any;
+}
+
+/// The number of the set that follows number k where something changes; kNever when nothing will.
+std::uint64_t PerceptionService::after(std::uint64_t k) const {
+  const double next_s = source_.next_time(static_cast<double>(k) * source_.period_s());
+  if (!std::isfinite(next_s)) return kNever;
+  return std::max(k + 1, static_cast<std::uint64_t>(std::llround(next_s / source_.period_s())));
+}
+
+runtime::Clock::time_point PerceptionService::due() const {
+  if (!clock_ || !clock_->running || clock_->pace == wire::Pace::lockstep || !next_) return last_status_ + 500ms;
+  const double wait_s = static_cast<double>(*next_) * source_.period_s() - clock_->t_s;
+  const auto next = clock_heard_ + std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(wait_s));
+  return std::min(next, last_status_ + 500ms);
+}
+
+void PerceptionService::publish_status(Time now, wire::ServiceState state) {
+  last_status_ = now;
+  wire::ServiceStatus s;
+  s.kind = wire::ServiceKind::perception;
+  s.arm = arm_;
+  s.incarnation = set_.incarnation;
+  s.version = runtime::version();
+  s.idl_hash = wire::idl_hash();
+  s.bus = bus_name_;
+  s.state = state;
+  s.detail = source_.is_static() ? "static obstacles" : "moving obstacles";
+  s.counters = {{"sets", published_}, {"repeated", repeated_}, {"undecodable", clock_in_.undecodable()}};
+  status_out_.publish(s);
+}
+
+void PerceptionService::close() { publish_status(runtime::Clock::now(), wire::ServiceState::stopping); }
+
+}  // namespace hamel::perception

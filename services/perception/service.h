@@ -1,0 +1,52 @@
+#pragma once
+/// The perception stub in its shell: the run's clock in, obstacle sets out.
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/runtime/loop.h"
+#include "common/scene/scene.h"
+#include "common/wire/endpoint.h"
+#include "services/perception/core/source.h"
+
+namespace hamel::perception {
+
+/// Sets have sample times k period_s on the run's clock; their content depends on k alone, so a restarted perception
+/// goes on as if nothing had happened.  In lockstep sets are published one clock message ahead, so that the planner
+/// need not wait for them, and none where nothing changes; in real time each period, when its time has come.  Inside a
+/// gap of a stream nothing is published: the planner's last set grows old and it says so.
+class PerceptionService final : public runtime::Service {
+ public:
+  /// Fails with what scene::problems() says of the scene's perception.
+  static Checked<std::unique_ptr<PerceptionService>> make(bus::Node& node, const scene::Scene& scene);
+  bool poll(runtime::Clock::time_point now) override;
+  runtime::Clock::time_point due() const override;
+  bool finished() const override { return false; }
+  void close() override;
+
+ private:
+  using Time = runtime::Clock::time_point;
+  PerceptionService(bus::Node& node, const scene::Scene& scene, Source source);
+
+  bool hear_clock(Time now);
+  double run_time_s(Time now) const;
+  bool publish_until(double t_s);
+  std::uint64_t after(std::uint64_t k) const;
+  void publish_status(Time now, wire::ServiceState state);
+
+  const std::uint32_t arm_;
+  const Source source_;
+  wire::Publisher<wire::ObstacleSet> sets_out_;
+  wire::Publisher<wire::ServiceStatus> status_out_;
+  wire::Subscription<wire::SimulationClock> clock_in_;
+  std::string bus_name_;
+
+  wire::ObstacleSet set_;
+  std::optional<wire::SimulationClock> clock_;
+  Time clock_heard_{}, last_status_{};
+  std::optional<std::uint64_t> next_;              ///< number of the next set; none: not begun
+  std::uint64_t published_ = 0, repeated_ = 0;
+};
+
+}  // namespace hamel::perception

@@ -1,0 +1,61 @@
+#include "services/planner/convert.h"
+
+#include <Eigen/Geometry>
+
+namespace hamel::planner {
+
+// Both sides list states, reasons and goal kinds in the same order; a reordering must not compile.
+static_assert(static_cast<int>(State::fault) == static_cast<int>(wire::PlannerState::fault));
+static_assert(static_cast<int>(State::stuck) == static_cast<int>(wire::PlannerState::stuck));
+static_assert(static_cast<int>(Reason::contact) == static_cast<int>(wire::Reason::contact));
+static_assert(static_cast<int>(Reason::internal) == static_cast<int>(wire::Reason::internal));
+static_assert(static_cast<int>(scene::GoalKind::joints) == static_cast<int>(wire::GoalKind::joints));
+
+wire::PlannerState to_wire(State state) { return static_cast<wire::PlannerState>(state); }
+
+scene::Goal from_wire(const wire::Goal& g) {
+  scene::Goal out;
+  out.id = g.id;
+  out.kind = static_cast<scene::GoalKind>(g.kind);
+  out.X_WG.p = g.position_m;
+  const Eigen::Vector4d& x = g.orientation_xyzw;
+  out.X_WG.R = Eigen::Quaterniond(x[3], x[0], x[1], x[2]).toRotationMatrix();
+  out.V_WG = g.twist;
+  out.joints = g.joints;
+  return out;
+}
+
+void to_wire(const Report& r, wire::PlannerReport& out) {
+  out.state = to_wire(r.state);
+  out.reason = static_cast<wire::Reason>(r.reason);
+  out.detail = r.detail;
+  out.goal_id = r.goal_id;
+  out.target_error_m = r.target_error_m;
+  out.orientation_error_rad = r.orientation_error_rad;
+  out.speed_mps = r.speed_mps;
+  out.end_effector_m = r.end_effector_m;
+  out.clearance_m = r.clearance_m;
+  out.clearance_min_m = r.clearance_min_m;
+  out.contacts = static_cast<std::uint32_t>(r.contacts);
+  out.path_length_m = r.path_length_m;
+  out.time_to_goal_s = r.time_to_goal_s;
+  out.gyroscopic_power_W = r.gyroscopic_power_W;
+  out.injected_power_W = r.injected_power_W;
+  out.links.resize(r.links.size());
+  for (std::size_t i = 0; i < r.links.size(); ++i) {
+    const LinkReport& a = r.links[i];
+    wire::LinkReport& b = out.links[i];
+    b.link = a.link;
+    b.obstacle = a.obstacle;
+    b.distance_m = a.distance_m;
+    b.point_on_link_m = a.point_on_link_m;
+    b.point_on_obstacle_m = a.point_on_obstacle_m;
+    b.closing_speed_mps = a.closing_speed_mps;
+    b.phi_rad = a.phi_rad;
+    b.gyroscopic_N = a.gyroscopic_N;
+    b.repulsive_N = a.repulsive_N;
+    b.barrier_multiplier = a.barrier_multiplier;
+  }
+}
+
+}  // namespace hamel::planner

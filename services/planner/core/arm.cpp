@@ -1,0 +1,69 @@
+#include "services/planner/core/arm.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace hamel::planner {
+namespace {
+
+model::Chain weightless(const model::Chain& chain) {
+  model::ChainSpec spec = chain.spec();
+  spec.gravity_W_mps2.setZero();
+  auto built = model::build(std::move(spec));
+  return std::move(built).value();  // a checked chain stays valid without gravity
+}
+
+// Largest distance between first joint and end effector: all offsets stretched out, prismatic joints at full
+// length.
+double reach(const model::Chain& chain) {
+  double sum = chain.X_NE().p.norm();
+  for (int i = 0; i < chain.n(); ++i) {
+    if (i > 0) sum += chain.joint(i).X_PJ.p.norm();
+    const auto& limits = chain.joint(i).limits;
+    if (chain.joint(i).kind == model::JointKind::prismatic)
+      sum += std::max(std::abs(limits.lower), std::abs(limits.upper));
+  }
+  return sum;
+}
+
+}  // namespace
+
+Arm::Arm(const model::Chain& with_gravity)
+    : chain(weightless(with_gravity)),
+      ws(chain),
+      q(Eigen::VectorXd::Zero(n())),
+      qd(q),
+      M(Eigen::MatrixXd::Identity(n(), n())),
+      M_inverse(M),
+      M_llt(M),
+      coriolis(q),
+      J_E(Eigen::MatrixXd::Zero(6, n())),
+      reach_m(reach(chain)),
+      shoulder_W(chain.X_WB0() * chain.joint(0).X_PJ.p) {}
+
+void Arm::look(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept {
+  q = q_now;
+  qd = qd_now;
+  rbd::velocities(chain, q, qd, ws);
+  X_WE = rbd::tip(chain, ws);
+  rbd::frame_jacobian(chain, ws, n() - 1, X_WE.p, J_E);
+  V_WE.noalias() = J_E * qd;
+}
+
+void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) noexcept {
+  qd.setZero();  // serves as the zero acceleration
+  rbd::inverse_dynamics(chain, q_now, qd_now, qd, ws, coriolis);
+  look(q_now, qd_now);
+  rbd::mass_matrix(chain, ws, M);
+  M_llt.compute(M);
+  M_inverse.setIdentity();
+  M_llt.solveInPlace(M_inverse);
+}
+
+Eigen::Vector3d Arm::angular_velocity(int link) const noexcept {
+  const auto i = static_cast<std::size_t>(link);
+  return ws.X_WB[i].R * ws.V_B[i].head<3>();
+}
+
+}  // namespace hamel::planner

@@ -1,0 +1,49 @@
+#pragma once
+/// The barrier of last resort: of all accelerations that keep their distance, the one nearest to what was
+/// wanted, in the metric of the mass matrix (Gauss's least constraint); planner.md 1.7.
+
+#include <Eigen/Core>
+
+#include "common/scene/options.h"
+#include "services/planner/core/arm.h"
+#include "services/planner/core/least_norm.h"
+#include "services/planner/core/pairs.h"
+
+namespace hamel::planner {
+
+/// d2/dt2 of the distance that comes from sliding and turning alone: no acceleration in it.  The distance is
+/// the least over positions s on the link's axis and t on the obstacle's; with F(s, t, time) = |y - x|
+///   curvature = F_tautau - m^T H^-1 m,  m = (F_s,tau, F_t,tau), H the Hessian in those of s, t that slide.
+double distance_curvature(const Pair& pair, const Eigen::Vector3d& omega_link) noexcept;
+
+class Barrier {
+ public:
+  Barrier(const Arm& arm, const scene::PlannerOptions& options);
+
+  struct Outcome {
+    int rows = 0, steps = 0;
+    bool active = false;      ///< some row pushed
+    bool infeasible = false;  ///< the rows contradict each other: no acceleration meets them all
+  };
+  /// min 1/2 (a - a0)^T M (a - a0)  subject to, with g the barrier gain,
+  ///   pairs:          hdd + 2 g hd + g^2 h >= 0,  h = d - dmin
+  ///   joints:         the same with the distance to each limit near enough, and |qd| within the velocity
+  ///   limit
+  /// exactly, by an active-set method in x = L^T (a - a0), M = L L^T.  @param a  in: a0, out: the minimiser;
+  /// where infeasible: what meets the rows taken in before the contradiction, the most violated first
+  Outcome solve(const Arm& arm, Pairs& pairs, Eigen::VectorXd& a) noexcept;
+
+ private:
+  void add_row(const Arm& arm, double b) noexcept;
+  void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
+  void add_joint_rows(const Arm& arm) noexcept;
+
+  const scene::PlannerOptions& options_;
+  LeastNorm least_norm_;
+  Eigen::MatrixXd A_, C_;  ///< a row's coefficients as a column; L^-1 times it, to length 1
+  Eigen::VectorXd b_, s_, length_, x_;
+  std::vector<std::size_t> pair_of_row_;
+  Eigen::Index rows_ = 0;
+};
+
+}  // namespace hamel::planner

@@ -1,0 +1,134 @@
+#pragma once
+/// One cycle of reactive planning: where the arm and the obstacles are now, which torque steers it.
+///
+/// Eqs. (17)-(21) of the paper and what makes them safe (../shared/design/planner.md, cited as "1.x"):
+///   tau = attraction (17) - bj M qd + forces of the obstacles.
+/// The torque EXCLUDES gravity; who applies it adds the compensation.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/geometry/shape.h"
+#include "common/scene/options.h"
+#include "common/scene/scene.h"
+#include "services/planner/core/memory.h"
+
+namespace hamel::planner {
+
+using Options = scene::PlannerOptions;
+
+/// In the order of the wire's enums.
+enum class State : std::uint8_t { idle, moving, reached, stuck, unsafe, fault };
+enum class Reason : std::uint8_t {
+  none,
+  local_minimum,
+  joint_limit,
+  goal_blocked,
+  unreachable,
+  orbit,
+  contact,
+  stale_obstacles,
+  stale_state,
+  infeasible,
+  non_finite,
+  torque_limit,
+  driver,
+  configuration,
+  internal
+};
+
+/// "MOVING", "local_minimum": the names users see.
+const char* to_string(State v) noexcept;
+const char* to_string(Reason v) noexcept;
+
+/// What one cycle reads.
+struct Input {
+  std::uint64_t step = 0;                         ///< of the arm state
+  double t_s = 0;                                 ///< sample time of the arm state
+  double dt_s = 1e-3;                             ///< how long the command will hold, > 0
+  const Eigen::VectorXd& q;                       ///< n [rad or m]
+  const Eigen::VectorXd& qd;                      ///< n [rad/s or m/s]
+  std::span<const geometry::Obstacle> obstacles;  ///< as stamped; any order
+  /// How old the obstacles are: they are extrapolated by it, inflated and, beyond the options' limits, braked
+  /// for. +inf: no set ever arrived.  A set that promised no successor (next_t_s = +inf) does not age: pass
+  /// 0.
+  double obstacle_age_s = 0;
+  double state_age_s = 0;           ///< how old the arm state is
+  bool obstacles_expected = false;  ///< the scene has perception: no motion before its first set
+};
+
+/// The obstacle nearest to one link and the forces it made there; world frame.
+struct LinkReport {
+  std::uint32_t link = 0, obstacle = 0;  ///< obstacle id, meaningful where distance is finite
+  double distance_m = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d point_on_link_m = Eigen::Vector3d::Zero(), point_on_obstacle_m = Eigen::Vector3d::Zero();
+  double closing_speed_mps = 0;  ///< > 0: approaching
+  double phi_rad = 0;            ///< angle between motion and obstacle
+  Eigen::Vector3d gyroscopic_N = Eigen::Vector3d::Zero(), repulsive_N = Eigen::Vector3d::Zero();
+  double barrier_multiplier = 0;  ///< [N] push of the barrier along -n
+};
+
+struct Report {
+  State state = State::idle;
+  Reason reason = Reason::none;
+  const char* detail = "";    ///< one sentence for people, static storage
+  std::uint64_t goal_id = 0;  ///< 0: none
+  double target_error_m = 0;  ///< joints: largest difference [rad or m]
+  double orientation_error_rad = 0;
+  double speed_mps = 0;  ///< of the end effector
+  Eigen::Vector3d end_effector_m = Eigen::Vector3d::Zero();
+  double clearance_m = std::numeric_limits<double>::infinity();      ///< smallest distance now
+  double clearance_min_m = std::numeric_limits<double>::infinity();  ///< smallest so far
+  std::uint64_t contacts = 0;                                        ///< cycles with clearance < 0 so far
+  double path_length_m = 0;                                          ///< of the end effector so far
+  double time_to_goal_s = -1;                                        ///< < 0: not reached yet
+  double gyroscopic_power_W = 0;            ///< 0 but for rounding where the mapping is powerless
+  double injected_power_W = 0;              ///< by moving obstacles and circulation
+  int pairs_in_range = 0;                   ///< (link shape, obstacle) pairs acted on
+  int pairs_dropped = 0;                    ///< in range but beyond kMaxPairs: the farthest ones
+  int barrier_rows = 0, barrier_steps = 0;  ///< rows seen, steps of its active set
+  std::vector<LinkReport> links;            ///< n, from base to tip
+};
+
+/// What one cycle writes.  Make it with Planner::output() so that plan() has nothing to allocate.
+struct Output {
+  Eigen::VectorXd torque_Nm;
+  Report report;
+};
+
+/// A planner bound to one robot and one set of options.  Not for two threads at once.
+class Planner {
+ public:
+  /// `options` must be valid (scene::problems()).  Link boxes and cylinders become their enclosing capsules.
+  Planner(const scene::Robot& robot, const Options& options);
+  ~Planner();
+  Planner(Planner&&) noexcept;
+  Planner& operator=(Planner&&) noexcept;
+
+  /// An output of the right sizes.
+  Output output() const;
+  /// A goal with a new id resets holds, flips and progress clocks; the same id again only moves the target.
+  /// A goal that does not fit the robot (number of joints, not finite) makes plan() report FAULT
+  /// configuration.
+  void set_goal(const scene::Goal& goal);
+  void clear_goal();
+  /// After a restart that lost its memory: the attraction ramps in over `ramp_s`, starting with a hold.
+  void ramp_in() noexcept;
+  /// One cycle.  Same memory and same input: same output, bit for bit.  No allocation, no throw, no clock.
+  /// Whatever the input, the torque is finite.
+  void plan(const Input& input, Output& output) noexcept;
+  /// What plan() carries from cycle to cycle.  restore() of a saved one (and set_goal() of the same goal)
+  /// continues exactly where it was saved.
+  const Memory& memory() const noexcept;
+  void restore(const Memory& memory) noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace hamel::planner

@@ -1,0 +1,328 @@
+#include "services/planner/service.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/runtime/options.h"
+#include "services/planner/convert.h"
+
+namespace hamel::planner {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr std::uint32_t kCheckpointKind = 0x0201;  // planner, layout 1
+constexpr double kMemoryFresh_s = 0.2;             // realtime: older memory is ramped in again
+constexpr auto kReportPeriod = 10ms;               // realtime: a report each, and one at every change of state
+
+struct SavedGoal {
+  std::uint64_t id = 0, kind = 0, joints = 0;
+  std::array<double, 12> pose{};
+  std::array<double, 6> twist{};
+};
+
+}  // namespace
+
+Result<std::unique_ptr<PlannerService>, Problem> PlannerService::make(bus::Node& node, const scene::Scene& scene,
+                                                                      const ServiceConfig& config) {
+  std::unique_ptr<PlannerService> s(new PlannerService(node, scene, config));
+  if (config.state_dir.empty()) return s;
+  const std::string path = config.state_dir + "/planner-" + std::to_string(scene.arm) + ".checkpoint";
+  auto c = runtime::Checkpoint::open(path, kCheckpointKind, sizeof(Memory) + 4096);
+  if (!c) return c.error();
+  s->checkpoint_ = std::move(c).value();
+  std::string note;
+  const auto bytes = s->checkpoint_->load(note);
+  if (!note.empty()) spdlog::warn("{}: {}", path, note);
+  if (!bytes.empty() && s->load(bytes))
+    spdlog::info("resumed at step {} with goal {}", *s->memory_step_, s->goal_ ? s->goal_->id : 0);
+  else if (!bytes.empty())
+    spdlog::warn("{}: of another scene or version, refused; starting afresh", path);
+  return s;
+}
+
+PlannerService::PlannerService(bus::Node& node, const scene::Scene& scene, const ServiceConfig& config)
+    : scene_(scene),
+      config_(config),
+      planner_(scene_.robot, scene_.planner),
+      output_(planner_.output()),
+      goal_(scene.goal),
+      command_out_(node),
+      report_out_(node),
+      status_out_(node),
+      state_in_(node),
+      obstacles_in_(node),
+      goal_in_(node),
+      mode_in_(node),
+      bus_name_(bus::to_string(node.options().vendor)) {
+  if (goal_) planner_.set_goal(*goal_);
+  report_.method = scene::to_string(scene.planner.method);
+  q_.resize(scene.robot.chain.n());
+  qd_.resize(scene.robot.chain.n());
+}
+
+bool PlannerService::poll(Time now) {
+  take_modes();
+  take_goals();
+  take_obstacles();
+  const bool heard = take_states(now);
+  const bool planned = answer(now);
+  if (!planned) report_silence(now);
+  if (now - last_status_ >= 500ms) publish_status(now, wire::ServiceState::ready);
+  if (checkpoint_ && now - last_sync_ >= 1s) {
+    last_sync_ = now;
+    checkpoint_->sync();
+  }
+  return heard || planned;
+}
+
+runtime::Clock::time_point PlannerService::due() const { return last_report_ + 100ms; }
+
+void PlannerService::take_goals() {
+  wire::Goal g;
+  while (goal_in_.take(g)) {
+    if (g.arm != scene_.arm || (goal_ && g.id < goal_->id)) continue;
+    if (!goal_ || g.id > goal_->id) spdlog::info("goal {}", g.id);
+    goal_ = from_wire(g);
+    planner_.set_goal(*goal_);
+  }
+}
+
+void PlannerService::take_modes() {
+  wire::ModeCommand m;
+  while (mode_in_.take(m)) {
+    if (m.arm != scene_.arm || m.id <= mode_id_) continue;
+    mode_id_ = m.id;
+    if (m.mode == wire::Mode::stop || m.mode == wire::Mode::hold) {
+      mode_ = m.mode;
+    } else {
+      mode_.reset();
+      // From rest again, without the clocks and faults of before: the goal is as new.
+      planner_.clear_goal();
+      if (goal_) planner_.set_goal(*goal_);
+      planner_.ramp_in();
+    }
+  }
+}
+
+void PlannerService::take_obstacles() {
+  while (obstacles_in_.take(set_)) view_.add(set_);
+}
+
+bool PlannerService::take_states(Time now) {
+  bool heard = false;
+  wire::ArmState s;
+  while (state_in_.take(s)) {
+    if (s.arm != scene_.arm) continue;
+    if (s.position.size() != q_.size()) {
+      if (refusals_(now))
+        spdlog::warn("state with {} joints refused: arm {} has {}", s.position.size(), scene_.arm, q_.size());
+      continue;
+    }
+    heard = true;
+    last_state_ = now;
+    if (incarnation_ != s.incarnation) meet(s);
+    // In lockstep the same state again means that our answer was lost: answer it again.
+    const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
+    if (s.step % period != 0) continue;
+    if (have_state_ && config_.pace == scene::Pace::realtime && s.step > state_.step + period) ++commands_late_;
+    state_ = s;
+    have_state_ = true;
+    answered_ = false;
+  }
+  return heard;
+}
+
+/// An arm that does not continue the one we know: what we remember of its motion means nothing.
+void PlannerService::meet(const wire::ArmState& s) {
+  const bool known = incarnation_.has_value();
+  incarnation_ = s.incarnation;
+  if (known) spdlog::info("arm {} began anew (incarnation {})", s.arm, s.incarnation);
+  memory_step_.reset();
+  planner_ = Planner(scene_.robot, scene_.planner);
+  if (goal_) planner_.set_goal(*goal_);
+}
+
+bool PlannerService::answer(Time now) {
+  if (!have_state_ || answered_) return false;
+  const bool lockstep = config_.pace == scene::Pace::lockstep;
+  if (lockstep && command_.step == state_.step && memory_step_ == state_.step) {
+    publish_command();
+    answered_ = true;
+    return true;
+  }
+  if (lockstep && !view_.covers(state_.t_s)) return false;
+  plan(now);
+  answered_ = true;
+  publish_command();
+  publish_report(now, lockstep);
+  save();
+  return true;
+}
+
+void PlannerService::plan(Time now) {
+  const Time began = runtime::Clock::now();
+  q_ = state_.position;
+  qd_ = state_.velocity;
+  command_.caused_by.size = 0;
+  command_.caused_by.add(wire::ServiceKind::dynamics, state_.step);
+  obstacle_age_s_ = view_.at(state_.t_s, obstacles_, command_.caused_by);
+  if (goal_) command_.caused_by.add(wire::ServiceKind::client, goal_->id);
+
+  if (config_.pace == scene::Pace::realtime) {
+    const double passed_s = memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
+    if (!memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s) planner_.ramp_in();
+  }
+  const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;
+  const Input in{.step = state_.step,
+                 .t_s = state_.t_s,
+                 .dt_s = period_s,
+                 .q = q_,
+                 .qd = qd_,
+                 .obstacles = obstacles_,
+                 .obstacle_age_s = obstacle_age_s_,
+                 .state_age_s = std::chrono::duration<double>(now - last_state_).count(),
+                 .obstacles_expected = true};
+  planner_.plan(in, output_);
+  memory_step_ = state_.step;
+  ++cycles_;
+  cycle_s_ = std::chrono::duration<double>(runtime::Clock::now() - began).count();
+}
+
+void PlannerService::publish_command() {
+  command_.arm = scene_.arm;
+  command_.epoch = epoch_;
+  command_.state_incarnation = state_.incarnation;
+  command_.step = state_.step;
+  command_.t_s = state_.t_s;
+  command_.torque = output_.torque_Nm;
+  command_.includes_gravity = false;
+  command_.planner_state = mode_ ? wire::PlannerState::idle : to_wire(output_.report.state);
+  command_out_.publish(command_);
+}
+
+void PlannerService::publish_report(Time now, bool always) {
+  to_wire(output_.report, report_);
+  if (mode_) {
+    report_.state = wire::PlannerState::idle;
+    report_.reason = wire::Reason::none;
+    report_.detail = *mode_ == wire::Mode::stop ? "stopped by a mode command" : "holding by a mode command";
+  }
+  const bool changed = report_.state != shown_ || report_.reason != shown_reason_;
+  if (!always && !changed && now - last_report_ < kReportPeriod) return;
+  if (changed) spdlog::debug("t = {:.3f} s: {} {}", state_.t_s, wire::to_string(report_.state), report_.detail);
+  shown_ = report_.state;
+  shown_reason_ = report_.reason;
+  last_report_ = now;
+  report_.arm = scene_.arm;
+  report_.epoch = epoch_;
+  report_.step = state_.step;
+  report_.t_s = state_.t_s;
+  report_.obstacle_age_s = obstacle_age_s_;
+  report_.cycle_time_s = cycle_s_;
+  report_.commands_late = commands_late_;
+  report_.caused_by = command_.caused_by;
+  report_out_.publish(report_);
+}
+
+/// Nothing to plan for: still say so, ten times a second.
+void PlannerService::report_silence(Time now) {
+  if (now - last_report_ < 100ms) return;
+  const bool lockstep = config_.pace == scene::Pace::lockstep;
+  report_.reason = wire::Reason::none;
+  if (!have_state_) {
+    report_.state = wire::PlannerState::idle;
+    report_.detail = "no arm state yet";
+  } else if (lockstep && !answered_) {
+    report_.state = wire::PlannerState::idle;
+    report_.detail = "waiting for the obstacles of this sample time";
+  } else if (now - last_state_ > topics::kState.stale && !lockstep) {
+    report_.state = wire::PlannerState::unsafe;
+    report_.reason = wire::Reason::stale_state;
+    report_.detail = "the arm's state is stale";
+  } else {
+    return;
+  }
+  shown_ = report_.state;
+  shown_reason_ = report_.reason;
+  last_report_ = now;
+  report_.arm = scene_.arm;
+  report_.epoch = epoch_;
+  report_out_.publish(report_);
+}
+
+void PlannerService::publish_status(Time now, wire::ServiceState state) {
+  last_status_ = now;
+  wire::ServiceStatus s;
+  s.kind = wire::ServiceKind::planner;
+  s.arm = scene_.arm;
+  s.incarnation = epoch_;
+  s.version = runtime::version();
+  s.idl_hash = wire::idl_hash();
+  s.bus = bus_name_;
+  s.state = state;
+  s.detail = wire::to_string(shown_);
+  s.counters = {{"cycles", cycles_},
+                {"commands_late", commands_late_},
+                {"undecodable", state_in_.undecodable() + obstacles_in_.undecodable() + goal_in_.undecodable() +
+                                    mode_in_.undecodable()}};
+  status_out_.publish(s);
+}
+
+void PlannerService::close() { publish_status(runtime::Clock::now(), wire::ServiceState::stopping); }
+
+void PlannerService::save() {
+  if (!checkpoint_ || !incarnation_ || !memory_step_) return;
+  runtime::Packer p(packed_);
+  p.put(static_cast<std::uint64_t>(q_.size()));
+  p.put(epoch_);
+  p.put(*incarnation_);
+  p.put(*memory_step_);
+  p.put(mode_.has_value() ? static_cast<std::int64_t>(*mode_) : -1);
+  p.put(mode_id_);
+  SavedGoal g;
+  if (goal_) {
+    g.id = goal_->id;
+    g.kind = static_cast<std::uint64_t>(goal_->kind);
+    Eigen::Map<Eigen::Matrix3d>(g.pose.data()) = goal_->X_WG.R;
+    Eigen::Map<Eigen::Vector3d>(g.pose.data() + 9) = goal_->X_WG.p;
+    Eigen::Map<lie::Twist>(g.twist.data()) = goal_->V_WG;
+  }
+  p.put(g);
+  p.put(goal_ ? goal_->joints.data() : nullptr, goal_ ? static_cast<std::size_t>(goal_->joints.size()) : 0);
+  p.put(planner_.memory());
+  checkpoint_->save(packed_);
+}
+
+bool PlannerService::load(std::span<const std::byte> bytes) {
+  runtime::Unpacker u(bytes);
+  std::uint64_t n = 0, epoch = 0, incarnation = 0, step = 0, mode_id = 0;
+  std::int64_t mode = -1;
+  SavedGoal g;
+  Eigen::VectorXd joints;
+  auto memory = std::make_unique<Memory>();
+  const bool whole = u.get(n) && u.get(epoch) && u.get(incarnation) && u.get(step) && u.get(mode) && u.get(mode_id) &&
+                     u.get(g) && u.get_doubles(joints) && u.get(*memory) && u.at_end();
+  if (!whole || n != static_cast<std::uint64_t>(q_.size())) return false;
+  epoch_ = epoch + 1;
+  incarnation_ = incarnation;
+  memory_step_ = step;
+  if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
+  mode_id_ = mode_id;
+  if (g.id > 0) {
+    scene::Goal goal;
+    goal.id = g.id;
+    goal.kind = static_cast<scene::GoalKind>(g.kind);
+    goal.X_WG.R = Eigen::Map<Eigen::Matrix3d>(g.pose.data());
+    goal.X_WG.p = Eigen::Map<Eigen::Vector3d>(g.pose.data() + 9);
+    goal.V_WG = Eigen::Map<lie::Twist>(g.twist.data());
+    goal.joints = joints;
+    goal_ = goal;
+    planner_.set_goal(goal);
+  }
+  planner_.restore(*memory);
+  return true;
+}
+
+}  // namespace hamel::planner

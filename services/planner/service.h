@@ -1,0 +1,89 @@
+#pragma once
+/// The planner service in its shell: states, obstacles, goals and modes in, commands and reports out.
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/runtime/checkpoint.h"
+#include "common/runtime/log.h"
+#include "common/runtime/loop.h"
+#include "common/wire/endpoint.h"
+#include "services/planner/core/planner.h"
+#include "services/planner/obstacle_view.h"
+
+namespace hamel::planner {
+
+struct ServiceConfig {
+  scene::Pace pace = scene::Pace::lockstep;
+  std::string state_dir = {};                           ///< checkpoint folder; empty: none
+};
+
+class PlannerService final : public runtime::Service {
+ public:
+  /// Fails where the checkpoint cannot be opened.
+  static Result<std::unique_ptr<PlannerService>, Problem> make(bus::Node& node, const scene::Scene& scene,
+                                                               const ServiceConfig& config);
+  bool poll(runtime::Clock::time_point now) override;
+  runtime::Clock::time_point due() const override;
+  bool finished() const override { return false; }
+  void close() override;
+
+ private:
+  using Time = runtime::Clock::time_point;
+  PlannerService(bus::Node& node, const scene::Scene& scene, const ServiceConfig& config);
+
+  void take_goals();
+  void take_modes();
+  bool take_states(Time now);
+  void take_obstacles();
+  void meet(const wire::ArmState& s);
+  bool answer(Time now);
+  void plan(Time now);
+  void publish_command();
+  void publish_report(Time now, bool always);
+  void report_silence(Time now);
+  void publish_status(Time now, wire::ServiceState state);
+  void save();
+  bool load(std::span<const std::byte> bytes);
+
+  const scene::Scene scene_;
+  const ServiceConfig config_;
+  Planner planner_;
+  Output output_;
+  std::uint64_t epoch_ = 1;
+  std::optional<scene::Goal> goal_;
+
+  wire::Publisher<wire::TorqueCommand> command_out_;
+  wire::Publisher<wire::PlannerReport> report_out_;
+  wire::Publisher<wire::ServiceStatus> status_out_;
+  wire::Subscription<wire::ArmState> state_in_;
+  wire::Subscription<wire::ObstacleSet> obstacles_in_;
+  wire::Subscription<wire::Goal> goal_in_;
+  wire::Subscription<wire::ModeCommand> mode_in_;
+  std::string bus_name_;
+
+  wire::ArmState state_;
+  wire::ObstacleSet set_;
+  wire::TorqueCommand command_;
+  wire::PlannerReport report_;
+  ObstacleView view_;
+  std::vector<geometry::Obstacle> obstacles_;
+  double obstacle_age_s_ = 0;
+  Eigen::VectorXd q_, qd_;
+
+  bool have_state_ = false, answered_ = true;      ///< answered: the newest state has its command
+  std::optional<std::uint64_t> incarnation_;       ///< of the arm we know
+  std::optional<std::uint64_t> memory_step_;       ///< the step our memory stands at
+  std::optional<wire::Mode> mode_;
+  std::uint64_t mode_id_ = 0, commands_late_ = 0, cycles_ = 0;
+  wire::PlannerState shown_ = wire::PlannerState::idle;
+  wire::Reason shown_reason_ = wire::Reason::none;
+  double cycle_s_ = 0;
+  Time last_state_{}, last_report_{}, last_status_{}, last_sync_{};
+  std::unique_ptr<runtime::Checkpoint> checkpoint_;
+  std::vector<std::byte> packed_;
+  runtime::RateLimit refusals_;
+};
+
+}  // namespace hamel::planner

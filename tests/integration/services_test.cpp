@@ -1,0 +1,238 @@
+/// The services over the in-process bus, with a planner of the test's own.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+
+#include "common/files/scene_text.h"
+#include "services/dynamics/service.h"
+#include "services/perception/service.h"
+#include "services/planner/obstacle_view.h"
+#include "services/planner/service.h"
+
+using namespace hamel;
+using runtime::Clock;
+using namespace std::chrono_literals;
+
+namespace {
+
+scene::Scene load(const std::string& name, std::vector<std::string> overrides = {}) {
+  auto s = files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/" + name + ".textproto", overrides);
+  if (!s) {
+    for (const auto& p : s.error()) ADD_FAILURE() << to_string(p);
+    std::abort();
+  }
+  return std::move(s).value();
+}
+
+std::unique_ptr<bus::Node> node(std::uint32_t domain) {
+  bus::NodeOptions o;
+  o.domain = domain;
+  auto n = bus::open(o);
+  EXPECT_TRUE(n);
+  return std::move(n).value();
+}
+
+/// A planner in lockstep that turns the first joint; one bit of one command may be flipped on its way.
+class RelayedPlanner {
+ public:
+  RelayedPlanner(bus::Node& n, std::uint64_t flip_at) : states_(n), commands_(n), flip_at_(flip_at) {}
+  bool poll() {
+    wire::ArmState s;
+    bool any = false;
+    while (states_.take(s)) {
+      wire::TorqueCommand c;
+      c.arm = s.arm;
+      c.epoch = 1;
+      c.state_incarnation = s.incarnation;
+      c.step = s.step;
+      c.t_s = s.t_s;
+      c.torque = wire::JointVector::Zero(s.position.size());
+      c.torque[0] = 0.25;
+      if (s.step == flip_at_) {
+        std::uint64_t bits;
+        std::memcpy(&bits, c.torque.data(), sizeof bits);
+        bits ^= 1;
+        std::memcpy(c.torque.data(), &bits, sizeof bits);
+      }
+      commands_.publish(c);
+      any = true;
+    }
+    return any;
+  }
+
+ private:
+  wire::Subscription<wire::ArmState> states_;
+  wire::Publisher<wire::TorqueCommand> commands_;
+  const std::uint64_t flip_at_;
+};
+
+wire::RunSummary run_relayed(std::uint64_t flip_at) {
+  const auto n = node(1);
+  const scene::Scene s = load("four_link_avoid", {"duration_s=0.2"});
+  wire::Subscription<wire::RunSummary> summaries(*n);
+  RelayedPlanner planner(*n, flip_at);
+  auto arm = dynamics::DynamicsService::make(*n, s, {});
+  EXPECT_TRUE(arm);
+  const auto deadline = Clock::now() + 60s;
+  while (!arm.value()->finished() && Clock::now() < deadline) {
+    arm.value()->poll(Clock::now());
+    planner.poll();
+  }
+  EXPECT_EQ(arm.value()->outcome(), dynamics::Outcome::done);
+  arm.value()->close();
+  wire::RunSummary last;
+  while (summaries.take(last)) {
+  }
+  EXPECT_TRUE(last.final_summary);
+  return last;
+}
+
+TEST(Lockstep, OneFlippedBitOfOneCommandChangesTheTrajectoryHash) {
+  constexpr std::uint64_t kNever = ~0ull;
+  const auto a = run_relayed(kNever), b = run_relayed(kNever), c = run_relayed(100);
+  EXPECT_EQ(a.steps, 200u);
+  EXPECT_EQ(a.trajectory_hash, b.trajectory_hash);
+  EXPECT_EQ(a.trajectory_hash.size(), 64u);
+  EXPECT_NE(a.trajectory_hash, c.trajectory_hash);
+}
+
+TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
+  const auto n = node(2);
+  const scene::Scene s = load("four_link_avoid");
+  auto arm = dynamics::DynamicsService::make(*n, s, {.patience = 50ms});
+  ASSERT_TRUE(arm);
+  const auto deadline = Clock::now() + 30s;
+  while (!arm.value()->finished() && Clock::now() < deadline) {
+    if (!arm.value()->poll(Clock::now())) n->wait(std::min(deadline, arm.value()->due()));
+  }
+  EXPECT_EQ(arm.value()->outcome(), dynamics::Outcome::no_command);
+  EXPECT_EQ(arm.value()->arm().state().step, 0u);
+}
+
+TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
+  const auto n = node(3);
+  const scene::Scene s = load("four_link_avoid");
+  wire::Publisher<wire::TorqueCommand> commands(*n);
+  auto arm = dynamics::DynamicsService::make(*n, s, {});
+  ASSERT_TRUE(arm);
+  auto& d = *arm.value();
+  wire::TorqueCommand good;
+  good.arm = s.arm;
+  good.epoch = 5;
+  good.state_incarnation = 1;
+  good.torque = wire::JointVector::Zero(4);
+  const auto steps_after = [&](auto change) {
+    wire::TorqueCommand c = good;
+    c.step = d.arm().state().step;
+    change(c);
+    commands.publish(c);
+    const auto before = d.arm().state().step;
+    d.poll(Clock::now());
+    return d.arm().state().step - before;
+  };
+  EXPECT_EQ(steps_after([](auto& c) { c.torque.resize(3); c.torque.setZero(); }), 0u);
+  EXPECT_EQ(steps_after([](auto& c) { c.state_incarnation = 2; }), 0u);
+  EXPECT_EQ(steps_after([](auto& c) { c.arm = 9; }), 0u);
+  EXPECT_EQ(steps_after([](auto& c) { c.step += 1; }), 0u);
+  EXPECT_EQ(steps_after([](auto&) {}), 1u);
+  EXPECT_EQ(steps_after([](auto& c) { c.epoch = 4; }), 0u) << "a planner that was taken over from";
+  EXPECT_EQ(steps_after([](auto& c) { c.epoch = 6; }), 1u) << "a planner that takes over";
+}
+
+/// Runs a scene in lockstep to `until`, all services new, with checkpoints in `folder`.
+wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain) {
+  const auto n = node(domain);
+  scene::Scene s = load("four_link_avoid", {"planner.method=gyro"});
+  s.duration_s = until_s;
+  wire::Subscription<wire::RunSummary> summaries(*n);
+  auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder});
+  auto eyes = perception::PerceptionService::make(*n, s);
+  auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder});
+  EXPECT_TRUE(arm && eyes && brain);
+  const auto deadline = Clock::now() + 60s;
+  while (!arm.value()->finished() && Clock::now() < deadline) {
+    bool any = arm.value()->poll(Clock::now());
+    any |= eyes.value()->poll(Clock::now());
+    any |= brain.value()->poll(Clock::now());
+    if (!any) n->wait(arm.value()->due());
+  }
+  EXPECT_EQ(arm.value()->outcome(), dynamics::Outcome::done);
+  arm.value()->close();
+  wire::RunSummary last;
+  while (summaries.take(last)) {
+  }
+  return last;
+}
+
+TEST(Restart, InLockstepContinuesBitForBit) {
+  const std::string folder = testing::TempDir() + "/hamel-restart";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const auto whole = run_to(1.0, "", 4);
+  (void)run_to(0.4, folder, 5);
+  const auto resumed = run_to(1.0, folder, 6);
+  EXPECT_EQ(resumed.steps, 1000u);
+  EXPECT_EQ(resumed.trajectory_hash, whole.trajectory_hash);
+  EXPECT_EQ(resumed.energy_drift_rel, whole.energy_drift_rel);
+  std::filesystem::remove_all(folder);
+}
+
+wire::ObstacleSet set(double t_s, double next_t_s, std::uint32_t source = 1, std::size_t n = 1) {
+  wire::ObstacleSet s;
+  s.source = source;
+  s.t_s = t_s;
+  s.next_t_s = next_t_s;
+  s.sequence_number = static_cast<std::uint64_t>(t_s * 10);
+  s.obstacles.resize(n);
+  return s;
+}
+
+TEST(ObstacleView, WaitsForTheSetThatCoversATime) {
+  planner::ObstacleView v;
+  EXPECT_FALSE(v.covers(0));
+  v.add(set(0.2, 0.3));  // came early
+  EXPECT_FALSE(v.covers(0.1));
+  EXPECT_TRUE(v.covers(0.2));
+  EXPECT_FALSE(v.covers(0.3)) << "a newer set may still come for it";
+}
+
+TEST(ObstacleView, UsesTheNewestSetThatIsNotFromTheFuture) {
+  planner::ObstacleView v;
+  std::vector<geometry::Obstacle> out;
+  wire::Causes causes;
+  EXPECT_TRUE(std::isinf(v.at(0, out, causes))) << "nothing ever arrived";
+  v.add(set(0, 0.1, 1, 1));
+  v.add(set(0.1, 0.2, 1, 2));
+  EXPECT_DOUBLE_EQ(v.at(0.05, out, causes), 0.05);
+  EXPECT_EQ(out.size(), 1u);
+  EXPECT_DOUBLE_EQ(v.at(0.15, out, causes), 0.15 - 0.1);
+  EXPECT_EQ(out.size(), 2u);
+  v.add(set(0, 0.1, 1, 1));  // late: its successor is in use
+  EXPECT_DOUBLE_EQ(v.at(0.15, out, causes), 0.15 - 0.1);
+  EXPECT_EQ(out.size(), 2u);
+}
+
+TEST(ObstacleView, AnEmptySetIsSomethingElseThanNone) {
+  planner::ObstacleView v;
+  std::vector<geometry::Obstacle> out;
+  wire::Causes causes;
+  v.add(set(0, wire::kInf, 1, 0));
+  EXPECT_EQ(v.at(7, out, causes), 0) << "it promised no successor: it does not age";
+  EXPECT_TRUE(v.covers(7));
+  EXPECT_TRUE(out.empty());
+}
+
+TEST(ObstacleView, PutsSourcesTogetherAndIsAsOldAsTheOldest) {
+  planner::ObstacleView v;
+  std::vector<geometry::Obstacle> out;
+  wire::Causes causes;
+  v.add(set(0.5, 1, 2, 3));
+  v.add(set(0, 1, 1, 2));
+  EXPECT_DOUBLE_EQ(v.at(0.6, out, causes), 0.6);
+  EXPECT_EQ(out.size(), 5u);
+  EXPECT_EQ(causes.size, 2u);
+}
+
+}  // namespace

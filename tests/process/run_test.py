@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""`hamel run` on the shipped scenes: the figures of the paper and of the acceptance list."""
+
+import csv
+import tempfile
+import unittest
+
+from programs import hamel, main, outcome, scene
+
+
+class Swing(unittest.TestCase):
+    """Example 5.1."""
+
+    def test_the_midpoint_tier_keeps_the_energy(self):
+        code, o = outcome("run", scene("three_link_swing"))
+        self.assertEqual(code, 0)
+        self.assertEqual(o["outcome"], "DONE")
+        self.assertEqual(o["steps"], 10000)
+        self.assertLessEqual(o["energy_drift_rel"], 1e-5)
+        self.assertGreater(o["energy_drift_rel"], 1e-7)  # it is second order at dt 0.01, not exact
+
+    def test_the_paper_literally_takes_four_iterations_and_loses_energy(self):
+        code, o = outcome("run", scene("three_link_swing"), "--set", "dynamics.tier=hamel", "--set", "dynamics.start=previous",
+                          "--set", "dynamics.tolerance_Nm=1e-8", "--set", "dynamics.root=feedback")
+        self.assertEqual(code, 0)
+        self.assertLessEqual(o["iterations_max"], 4)
+        self.assertLess(o["residual_max_Nm"], 1e-8)
+        self.assertAlmostEqual(o["energy_drift_rel"], 1.9e-2, delta=2e-3)
+
+    def test_the_last_row_is_the_reference_of_two_solvers(self):
+        with tempfile.NamedTemporaryFile(suffix=".csv") as f:
+            code, _ = outcome("run", scene("three_link_swing"), "--csv", f.name)
+            self.assertEqual(code, 0)
+            with open(f.name, newline="") as rows:
+                table = list(csv.DictReader(rows))
+        self.assertEqual(len(table), 10001)
+        last = table[-1]
+        self.assertAlmostEqual(float(last["t_s"]), 100.0)
+        for name, reference in zip(("q1", "q2", "q3"), (-0.18375788, 0.18144555, -2.70032981)):
+            self.assertAlmostEqual(float(last[name]), reference, delta=2e-3)
+
+
+class FourLink(unittest.TestCase):
+    """Example 5.2, set s1."""
+
+    def test_the_paper_reaches_past_the_obstacle(self):
+        code, o = outcome("run", scene("four_link_avoid"))
+        self.assertEqual((code, o["outcome"], o["contacts"]), (0, "REACHED", 0))
+        self.assertAlmostEqual(o["time_to_goal_s"], 5.5, delta=0.3)
+        self.assertAlmostEqual(o["min_clearance_m"], 0.187, delta=0.01)
+        self.assertLess(o["final_error_m"], 1e-9)
+
+    def test_khatib_is_stuck_and_says_why(self):
+        code, o = outcome("run", scene("four_link_khatib"))
+        self.assertEqual((code, o["outcome"], o["reason"]), (1, "STUCK", "local_minimum"))
+        self.assertGreater(o["final_error_m"], 1.0)
+        self.assertEqual(o["contacts"], 0)
+
+    def test_attraction_alone_hits_the_obstacle_and_is_never_called_reached(self):
+        code, o = outcome("run", scene("four_link_avoid"), "--set", "planner.method=attract")
+        self.assertEqual((code, o["outcome"], o["reason"]), (1, "UNSAFE", "contact"))
+        self.assertGreater(o["contacts"], 0)
+
+    def test_the_default_method_reaches_without_contact(self):
+        code, o = outcome("run", scene("four_link_avoid"), "--set", "planner.method=gyro")
+        self.assertEqual((code, o["outcome"], o["contacts"]), (0, "REACHED", 0))
+
+    def test_twice_the_same_to_the_last_bit(self):
+        hashes = {outcome("run", scene("four_link_avoid"), "--duration", "3")[1]["trajectory_hash"] for _ in range(2)}
+        self.assertEqual(len(hashes), 1)
+        other = outcome("run", scene("four_link_avoid"), "--duration", "3", "--set", "planner.kobs=4.0000001")[1]
+        self.assertNotIn(other["trajectory_hash"], hashes)
+
+
+class Panda(unittest.TestCase):
+    def test_reaches_past_three_spheres(self):
+        code, o = outcome("run", scene("panda_reach"))
+        self.assertEqual((code, o["outcome"], o["contacts"]), (0, "REACHED", 0), o)
+
+    def test_a_person_moving_beside_it_is_not_touched(self):
+        code, o = outcome("run", scene("panda_person"))
+        self.assertEqual((code, o["outcome"], o["contacts"]), (0, "REACHED", 0), o)
+
+
+class Output(unittest.TestCase):
+    def test_not_in_time_is_exit_code_three(self):
+        code, o = outcome("run", scene("four_link_avoid"), "--duration", "1")
+        self.assertEqual((code, o["outcome"], o["reason"]), (3, "MOVING", "not_reached_in_time"))
+
+    def test_the_table_says_the_outcome(self):
+        code, out, _ = hamel("run", scene("four_link_avoid"), "--duration", "1")
+        self.assertEqual(code, 3)
+        self.assertIn("MOVING", out)
+        self.assertIn("trajectory hash", out)
+
+    def test_a_full_disk_is_said(self):
+        code, _, err = hamel("run", scene("three_link_swing"), "--duration", "1", "--csv", "/dev/full")
+        self.assertEqual(code, 2)
+        self.assertIn("/dev/full", err)
+
+
+if __name__ == "__main__":
+    main()

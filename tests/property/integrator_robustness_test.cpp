@@ -1,0 +1,301 @@
+// The integrator at its limits: it refuses by name, leaves the state alone, never allocates, resumes exactly.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/rbd/rbd.h"
+#include "services/dynamics/core/integrator.h"
+#include "tests/support/chains.h"
+#include "tests/support/no_alloc.h"
+#include "tests/support/tiers.h"
+
+namespace hamel::dynamics {
+namespace {
+
+using Eigen::VectorXd;
+const Tier kTiers[] = {Tier::hamel, Tier::midpoint, Tier::semi_implicit_euler, Tier::rk4};
+
+bool same(const State& a, const State& b) {
+  return a.step == b.step && a.q == b.q && a.p == b.p && a.qd == b.qd && a.history == b.history;
+}
+
+class Robustness : public test::ForSeed {
+ protected:
+  const int n = 1 + static_cast<int>(GetParam() % 7);
+  const model::Chain chain = test::random_chain(rng, n, {.damping = 0.3});
+  const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 1), tau = rng.vector(n, 1);
+};
+INSTANTIATE_TEST_SUITE_P(Property, Robustness, testing::Range(0u, 14u));
+
+TEST_P(Robustness, ResumesBitForBit) {
+  for (const Tier tier : kTiers) {
+    const Options options{.tier = tier, .dt_s = 1e-3};
+    Integrator whole(chain, options);
+    State a = whole.start(q, qd);
+    for (int k = 0; k < 50; ++k) ASSERT_TRUE(whole.step(a, tau).usable());
+    State b = a;
+    for (int k = 0; k < 50; ++k) ASSERT_TRUE(whole.step(a, tau).usable());
+    Integrator resumed(chain, options);
+    for (int k = 0; k < 50; ++k) ASSERT_TRUE(resumed.step(b, tau).usable());
+    EXPECT_TRUE(same(a, b)) << test::name(tier) << " " << (a.q - b.q).norm();
+    EXPECT_EQ(a.step, 100u);
+  }
+}
+
+TEST_P(Robustness, ServesManyStatesInTurn) {
+  Integrator integrator(chain, {.dt_s = 1e-3}), other(chain, {.dt_s = 1e-3});
+  State a = integrator.start(q, qd), b = integrator.start(qd, q), alone = a;
+  for (int k = 0; k < 20; ++k) {
+    ASSERT_TRUE(integrator.step(a, tau).usable());
+    ASSERT_TRUE(integrator.step(b, tau).usable());
+    ASSERT_TRUE(other.step(alone, tau).usable());
+  }
+  EXPECT_TRUE(same(a, alone));
+}
+
+TEST_P(Robustness, AllocatesNothingInAStep) {
+  if (!test::NoAlloc::supported()) GTEST_SKIP();
+  for (const Tier tier : kTiers) {
+    for (const double dt : {1e-3, 0.3}) {  // the longer one is divided, or refused
+      Integrator integrator(chain, {.tier = tier, .dt_s = dt, .stop_stiffness = 10});
+      State s = integrator.start(q, qd);
+      VectorXd tau_g = tau;
+      test::NoAlloc guard;
+      int usable = 0;
+      for (int k = 0; k < 20; ++k) usable += integrator.step(s, tau).usable();
+      const double E = integrator.energy(s);
+      integrator.gravity_torque(s.q, tau_g);
+      EXPECT_EQ(guard.calls(), 0) << test::name(tier) << " " << usable << " " << E;
+    }
+  }
+}
+
+TEST_P(Robustness, LeavesStateUntouchedWhenItFails) {
+  for (const Tier tier : kTiers) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = 10, .max_subdivisions = 0});
+    State s = integrator.start(q, VectorXd::Constant(n, 100));
+    const State before = s;
+    const StepReport report = integrator.step(s, VectorXd::Constant(n, 1e6));
+    if (report.usable()) continue;  // a single joint may well manage
+    EXPECT_TRUE(same(s, before)) << test::name(tier);
+  }
+}
+
+TEST_P(Robustness, RefusesWhatIsNotFinite) {
+  const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
+  for (const Tier tier : kTiers) {
+    Integrator integrator(chain, {.tier = tier});
+    for (const double bad : {nan, inf, -inf}) {
+      const State good = integrator.start(q, qd);
+      State s = good;
+      EXPECT_EQ(integrator.step(s, bad * VectorXd::Ones(n)).stop, Stop::diverged);
+      EXPECT_TRUE(same(s, good));
+      for (VectorXd State::*part : {&State::q, &State::p, &State::qd}) {
+        State broken = good;
+        (broken.*part)[n - 1] = bad;
+        EXPECT_FALSE(integrator.step(broken, tau).usable());
+      }
+      EXPECT_TRUE(integrator.step(s, tau).usable());  // and goes on as if nothing had been
+    }
+    State s;
+    EXPECT_FALSE(integrator.step(s, tau).usable());
+  }
+}
+
+// A step too long for the motion is divided, and the parts give what short steps give.
+TEST(Subdivision, DividesAStepThatDoesNotConverge) {
+  const model::Chain chain = test::fast_rods();
+  Integrator coarse(chain, {.dt_s = 0.2}), fine(chain, {.dt_s = 0.2 / 4096});
+  const VectorXd zero = VectorXd::Zero(3), qd = Eigen::Vector3d(3, 10, -20);
+  State a = coarse.start(zero, qd), b = fine.start(zero, qd);
+  const StepReport report = coarse.step(a, zero);
+  ASSERT_TRUE(report.usable());
+  EXPECT_GT(report.substeps, 1);
+  for (int k = 0; k < 4096; ++k) ASSERT_TRUE(fine.step(b, zero).usable());
+  EXPECT_LT((a.q - b.q).norm(), 0.3);
+  EXPECT_EQ(a.step, 1u);
+}
+
+TEST(Subdivision, NeverReturnsAnAbsurdStateSilently) {
+  const model::Chain chain = test::fast_rods();
+  const double scale = rbd::energy_scale(chain);
+  const VectorXd zero = VectorXd::Zero(3);
+  for (const double dt : {0.003, 0.01, 0.03, 0.1, 0.3, 1.0}) {
+    Integrator integrator(chain, {.dt_s = dt});
+    State s = integrator.start(zero, zero);
+    for (int k = 0; k < 300; ++k) {
+      const double before = integrator.energy(s);
+      const StepReport report = integrator.step(s, zero);
+      if (!report.usable()) break;
+      ASSERT_LT(std::abs(integrator.energy(s) - before),
+                0.5 * report.substeps * (2 * scale + std::abs(before)));
+    }
+  }
+}
+
+TEST(Extremes, Integrates) {
+  test::Random rng(7);
+  struct Case {
+    const char* name;
+    double mass, length, inertia, rate, dt;
+  };
+  const Case cases[] = {
+      {"tiny inertia", 1e-6, 1e-2, 1e-9, 1, 1e-4}, {"tiny links", 1e-3, 1e-4, 1e-9, 1, 1e-4},
+      {"huge links", 1e3, 1e3, 1e8, 0.1, 1e-2},    {"fast", 1, 0.1, 0.01, 1e3, 1e-5},
+      {"shortest step", 1, 0.5, 0.1, 1, 1e-7},     {"longest step", 1, 0.1, 1, 0.01, 1}};
+  for (const Case& c : cases) {
+    for (const Tier tier : {Tier::midpoint, Tier::hamel}) {
+      const model::Chain chain = test::checked(test::planar(3, c.mass, c.length, c.inertia));
+      Integrator integrator(chain, {.tier = tier, .dt_s = c.dt});
+      State s = integrator.start(rng.vector(3, 3), c.rate * VectorXd::Ones(3));
+      const double E0 = integrator.energy(s), scale = std::abs(E0) + rbd::energy_scale(chain);
+      for (int k = 0; k < 100; ++k) {
+        const StepReport report = integrator.step(s, VectorXd::Zero(3));
+        ASSERT_TRUE(report.usable()) << c.name << " " << test::name(tier) << " step " << k << " stop "
+                                     << static_cast<int>(report.stop) << " residual " << report.residual_Nm;
+      }
+      if (tier == Tier::hamel) continue;  // it may lose what it likes
+      EXPECT_LT(std::abs(integrator.energy(s) - E0), 0.05 * scale) << c.name << " " << test::name(tier);
+    }
+  }
+}
+
+TEST(Extremes, MassRatioOfAMillionEitherWay) {
+  for (const double ratio : {1e-6, 1e6}) {
+    model::ChainSpec spec = test::planar(2, 1, 0.5, 0.05);
+    spec.links[1].inertia.mass_kg *= ratio;
+    spec.links[1].inertia.about_com_kgm2 *= ratio;
+    const model::Chain chain = test::checked(spec);
+    Integrator integrator(chain, {.dt_s = 1e-3});
+    State s = integrator.start(VectorXd::Constant(2, 0.3), VectorXd::Zero(2));
+    const double E0 = integrator.energy(s);
+    for (int k = 0; k < 2000; ++k)
+      ASSERT_TRUE(integrator.step(s, VectorXd::Zero(2)).usable()) << ratio << " " << k;
+    EXPECT_LT(std::abs(integrator.energy(s) - E0), 1e-4 * rbd::energy_scale(chain));
+  }
+}
+
+TEST(Extremes, WoundUpToAMillionRadians) {
+  const model::Chain chain = test::paper_5_1();
+  Integrator integrator(chain, {.dt_s = 1e-2});
+  const double turns = 2 * M_PI * 159155;
+  State near = integrator.start(VectorXd::Constant(3, 0.4), VectorXd::Zero(3));
+  State far = integrator.start(VectorXd::Constant(3, 0.4 + turns), VectorXd::Zero(3));
+  for (int k = 0; k < 500; ++k) {
+    ASSERT_TRUE(integrator.step(near, VectorXd::Zero(3)).usable());
+    ASSERT_TRUE(integrator.step(far, VectorXd::Zero(3)).usable());
+  }
+  EXPECT_LT(((far.q.array() - turns).matrix() - near.q).norm(), 1e-6);
+}
+
+TEST(Extremes, StrongDampingIsImplicit) {
+  model::ChainSpec spec = test::planar(3, 1, 0.1, 1e-3);
+  for (model::Joint& j : spec.joints) j.damping = 1e3;
+  const model::Chain chain = test::checked(spec);
+  Integrator integrator(chain, {.dt_s = 1e-2});
+  State s = integrator.start(VectorXd::Zero(3), VectorXd::Constant(3, 1));
+  for (int k = 0; k < 100; ++k) ASSERT_TRUE(integrator.step(s, VectorXd::Zero(3)).usable()) << k;
+  EXPECT_LT(s.q.norm(), 0.1);
+}
+
+TEST(Stops, HoldTheArmNearItsLimits) {
+  model::ChainSpec spec = test::planar(2, 1, 0.5, 0.02);
+  for (model::Joint& j : spec.joints) j.limits.lower = -0.5, j.damping = 0.5;
+  const model::Chain chain = test::checked(spec);
+  for (const Tier tier : kTiers) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = 1e-3, .stop_stiffness = 1e4});
+    State s = integrator.start(VectorXd::Zero(2), VectorXd::Zero(2));
+    double lowest = 0;
+    for (int k = 0; k < 5000; ++k) {
+      ASSERT_TRUE(integrator.step(s, VectorXd::Zero(2)).usable());
+      lowest = std::min(lowest, s.q.minCoeff());
+    }
+    EXPECT_GT(lowest, -0.6) << test::name(tier);
+    EXPECT_LT(s.q[0], -0.49) << test::name(tier);
+  }
+}
+
+// A free joint under constant torque is integrated without error, at any step.
+TEST(Prismatic, SlideFallsByTheBook) {
+  model::ChainSpec spec = test::planar(1, 2, 0, 1);
+  spec.joints[0].kind = model::JointKind::prismatic;
+  spec.joints[0].axis = Eigen::Vector3d::UnitY();
+  const model::Chain chain = test::checked(spec);
+  Integrator integrator(chain, {.dt_s = 0.1});
+  State s = integrator.start(VectorXd::Zero(1), VectorXd::Constant(1, 3));
+  for (int k = 0; k < 10; ++k) ASSERT_TRUE(integrator.step(s, VectorXd::Constant(1, 4)).usable());
+  EXPECT_NEAR(s.q[0], 3 + 0.5 * (4. / 2 - 9.81), 1e-13);
+  EXPECT_NEAR(s.qd[0], 3 + (4. / 2 - 9.81), 1e-13);
+}
+
+TEST(Linear, EvaluationsDoNotGrowWithTheChain) {
+  for (const int n : {3, 30, 300, 1000}) {
+    model::ChainSpec spec = test::planar(n, 1.0 / n, 1.0 / n, 1e-2 / n);
+    const model::Chain chain = test::checked(spec);
+    Integrator integrator(chain, {.dt_s = 1e-4});
+    State s = integrator.start(VectorXd::Zero(n), VectorXd::Zero(n));
+    int worst = 0;
+    for (int k = 0; k < 20; ++k) {
+      const StepReport report = integrator.step(s, VectorXd::Zero(n));
+      ASSERT_TRUE(report.usable()) << n << " joints, step " << k;
+      worst = std::max(worst, report.evaluations);
+    }
+    EXPECT_LE(worst, 5) << n << " joints";
+  }
+}
+
+/// At joints that carry no torque the momentum stays zero as a sum of parts that cancel: rounding must be known by
+/// the parts.
+TEST(Start, ATorqueAtOneJointSetsARestingArmInMotion) {
+  for (const Tier tier : {Tier::midpoint, Tier::hamel})
+    for (const Root root : {Root::feedback, Root::newton})
+      for (const double dt_s : {1e-4, 1e-3, 1e-2}) {
+        auto spec = test::planar(4, 1, 1, 1);
+        spec.gravity_W_mps2.setZero();
+        const model::Chain chain = test::checked(spec);
+        Options options;
+        options.tier = tier;
+        options.root = root;
+        options.dt_s = dt_s;
+        Integrator integrator(chain, options);
+        State state = integrator.start(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Zero(4));
+        const Eigen::VectorXd tau = Eigen::Vector4d(0.25, 0, 0, 0);
+        for (int k = 0; k < 200; ++k) {
+          const StepReport r = integrator.step(state, tau);
+          ASSERT_TRUE(r.usable()) << scene::to_string(tier) << " dt " << dt_s << " step " << k;
+          ASSERT_EQ(r.substeps, 1);
+        }
+        EXPECT_GT(state.q[0], 0);
+      }
+}
+
+TEST(Start, PutsMomentumIntoTheState) {
+  const model::Chain chain = test::paper_5_1();
+  const Integrator integrator(chain, {});
+  const VectorXd q = Eigen::Vector3d(0.1, 0.2, 0.3), qd = Eigen::Vector3d(1, -2, 3);
+  const State s = integrator.start(q, qd);
+  rbd::Workspace ws(chain);
+  Eigen::MatrixXd M(3, 3);
+  rbd::positions(chain, q, ws);
+  rbd::mass_matrix(chain, ws, M);
+  EXPECT_LT((s.p - M * qd).norm(), 1e-14 * s.p.norm());
+  EXPECT_LT((s.qd - qd).norm(), 1e-14);
+  EXPECT_EQ(s.step, 0u);
+}
+
+TEST(GravityTorque, HoldsTheArmStill) {
+  const model::Chain chain = test::paper_5_1();
+  Integrator integrator(chain, {});
+  State s = integrator.start(Eigen::Vector3d(0.3, -0.5, 0.7), VectorXd::Zero(3));
+  VectorXd tau(3);
+  const VectorXd q0 = s.q;
+  for (int k = 0; k < 1000; ++k) {
+    integrator.gravity_torque(s.q, tau);
+    ASSERT_TRUE(integrator.step(s, tau).usable());
+  }
+  EXPECT_LT((s.q - q0).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace hamel::dynamics

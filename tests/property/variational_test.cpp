@@ -1,0 +1,181 @@
+// What makes an integrator variational, over random chains: structure that ordinary methods lose.
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "common/rbd/rbd.h"
+#include "services/dynamics/core/integrator.h"
+#include "tests/support/chains.h"
+#include "tests/support/tiers.h"
+
+namespace hamel::dynamics {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+StepReport step_from(const model::Chain& chain, const Options& options, VectorXd& q, VectorXd& p) {
+  Integrator integrator(chain, options);
+  State s = integrator.start(q, VectorXd::Zero(q.size()));
+  s.p = p;
+  const StepReport report = integrator.step(s, VectorXd::Zero(q.size()));
+  q = s.q, p = s.p;
+  return report;
+}
+
+/// |J^T Omega J - Omega| of the one-step map's Jacobian J by central differences.
+double symplectic_defect(const model::Chain& chain, const Options& options, const VectorXd& q,
+                         const VectorXd& p) {
+  const Eigen::Index n = q.size();
+  MatrixXd J(2 * n, 2 * n), Omega = MatrixXd::Zero(2 * n, 2 * n);
+  Omega.topRightCorner(n, n).setIdentity();
+  Omega.bottomLeftCorner(n, n) = -MatrixXd::Identity(n, n);
+  const double e = 1e-4;
+  for (Eigen::Index i = 0; i < 2 * n; ++i) {
+    const auto moved = [&](double s) {
+      VectorXd z(2 * n);
+      z << q, p;
+      z[i] += s;
+      VectorXd a = z.head(n), b = z.tail(n);
+      EXPECT_TRUE(step_from(chain, options, a, b).usable());
+      z << a, b;
+      return z;
+    };
+    // fourth-order differences
+    J.col(i) = (8 * (moved(e) - moved(-e)) - (moved(2 * e) - moved(-2 * e))) / (12 * e);
+  }
+  return (J.transpose() * Omega * J - Omega).cwiseAbs().maxCoeff() / J.cwiseAbs().maxCoeff();
+}
+
+class Variational : public test::ForSeed {
+ protected:
+  const int n = 1 + static_cast<int>(GetParam() % 5);
+};
+INSTANTIATE_TEST_SUITE_P(Property, Variational, testing::Range(0u, 20u));
+
+/// What must be symplectic: tiers and sizes of step.
+const Options kSymplectic[] = {{.tier = Tier::midpoint, .dt_s = 0.01},
+                               {.tier = Tier::midpoint, .dt_s = 0.001}};
+
+TEST_P(Variational, StepIsSymplectic) {
+  const model::Chain chain = test::random_chain(rng, n, {.mass_spread = 0.3});
+  const VectorXd q = rng.vector(n, 3), p = rng.vector(n, 0.5);
+  for (const Options& options : kSymplectic)
+    EXPECT_LT(symplectic_defect(chain, options, q, p), 2e-9) << options.dt_s;
+}
+
+TEST(Symplectic, TestSeesTheDefectOfThePapersTier) {
+  const model::Chain chain = test::paper_5_1();
+  const VectorXd q = Eigen::Vector3d(0.3, 0.8, -1.1), p = Eigen::Vector3d(1, 3, 2);
+  EXPECT_GT(symplectic_defect(chain, {.tier = Tier::hamel, .dt_s = 0.01}, q, p), 1e-5);
+  EXPECT_LT(symplectic_defect(chain, {.tier = Tier::midpoint, .dt_s = 0.01}, q, p), 1e-10);
+}
+
+TEST_P(Variational, TimeRunsBackToTheStart) {
+  const model::Chain chain = test::random_chain(rng, n, {.mass_spread = 0.3});
+  const Options options{.dt_s = 1e-3};
+  Integrator integrator(chain, options);
+  State s = integrator.start(rng.vector(n, 3), rng.vector(n, 1));
+  const State begin = s;
+  const VectorXd tau = rng.vector(n, 1);
+  for (int k = 0; k < 200; ++k) ASSERT_TRUE(integrator.step(s, tau).usable());
+  s.p = -s.p;
+  s.history.assign(s.history.size(), 0);
+  for (int k = 0; k < 200; ++k) ASSERT_TRUE(integrator.step(s, tau).usable());
+  EXPECT_LT((s.q - begin.q).norm(), 1e-9 * (1 + begin.q.norm()));
+  EXPECT_LT((s.p + begin.p).norm(), 1e-9 * (1 + begin.p.norm()));
+}
+
+// Turning the whole arm about joint 1 changes nothing when there is no gravity: its momentum stays.
+TEST_P(Variational, MomentumAboutTheFirstAxisStaysWithoutGravity) {
+  const model::Chain chain = test::random_chain(rng, n, {.gravity = false});
+  Integrator integrator(chain, {.dt_s = 2e-3});
+  State s = integrator.start(rng.vector(n, 3), rng.vector(n, 2));
+  const double p0 = s.p[0], scale = s.p.cwiseAbs().maxCoeff();
+  for (int k = 0; k < 2000; ++k) ASSERT_TRUE(integrator.step(s, VectorXd::Zero(n)).usable());
+  EXPECT_LT(std::abs(s.p[0] - p0), 2000 * 2e-15 * (scale + std::abs(p0)));
+}
+
+/// The state after `time_s`, by steps of dt.
+VectorXd travel(const model::Chain& chain, Options options, const VectorXd& q, const VectorXd& qd,
+                const VectorXd& tau, double time_s, int steps) {
+  options.dt_s = time_s / steps;
+  Integrator integrator(chain, options);
+  State s = integrator.start(q, qd);
+  for (int k = 0; k < steps; ++k) EXPECT_TRUE(integrator.step(s, tau).usable());
+  VectorXd z(2 * q.size());
+  z << s.q, s.qd;
+  return z;
+}
+
+struct Order {
+  Options options;
+  double order;
+  int steps;
+};
+const Order kOrders[] = {{{.tier = Tier::midpoint}, 2, 400},
+                         {{.tier = Tier::hamel}, 1, 3200},
+                         {{.tier = Tier::hamel, .alpha = 0}, 1, 3200},
+                         {{.tier = Tier::hamel, .alpha = 1}, 1, 3200},
+                         {{.tier = Tier::semi_implicit_euler}, 1, 3200},
+                         {{.tier = Tier::rk4}, 4, 100}};
+
+// With torque, damping and armature: forces must not cost the order.
+TEST_P(Variational, OrderShowsInRichardsonSlopes) {
+  const model::Chain chain = test::random_chain(rng, n, {.armature = 1, .damping = 1, .mass_spread = 0.3});
+  const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 1), tau = rng.vector(n, 1);
+  for (const Order& o : kOrders) {
+    if (n == 1 && o.options.tier == Tier::hamel) continue;  // one joint: nothing to lag behind, order 2
+    const auto at = [&](int steps) { return travel(chain, o.options, q, qd, tau, 0.2, steps); };
+    const VectorXd coarse = at(o.steps), middle = at(2 * o.steps), fine = at(4 * o.steps);
+    const double slope = std::log2((coarse - middle).norm() / (middle - fine).norm());
+    EXPECT_NEAR(slope, o.order, 0.15) << test::name(o.options.tier) << " alpha " << o.options.alpha;
+  }
+}
+
+TEST_P(Variational, TiersAgreeOnTheMotion) {
+  const model::Chain chain = test::random_chain(rng, n, {.damping = 0.5, .mass_spread = 0.3});
+  const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 1), tau = rng.vector(n, 1);
+  const VectorXd reference = travel(chain, {.tier = Tier::rk4}, q, qd, tau, 0.2, 800);
+  EXPECT_LT((travel(chain, {.tier = Tier::midpoint}, q, qd, tau, 0.2, 2000) - reference).norm(), 1e-4);
+  EXPECT_LT((travel(chain, {.tier = Tier::hamel}, q, qd, tau, 0.2, 2000) - reference).norm(), 2e-2);
+}
+
+TEST_P(Variational, WorkIsTheChangeOfEnergy) {
+  const model::Chain chain = test::random_chain(rng, n, {.armature = 1, .damping = 1, .mass_spread = 0.3});
+  for (const Tier tier : {Tier::midpoint, Tier::rk4}) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = 1e-4});
+    State s = integrator.start(rng.vector(n, 3), rng.vector(n, 1));
+    const VectorXd tau = rng.vector(n, 1);
+    const double E0 = integrator.energy(s);
+    double work = 0, effort = 0;
+    for (int k = 0; k < 1000; ++k) {
+      const StepReport report = integrator.step(s, tau);
+      ASSERT_TRUE(report.usable());
+      work += report.work_J;
+      effort += std::abs(report.work_J);
+    }
+    EXPECT_NEAR(integrator.energy(s) - E0, work, 1e-5 * (effort + std::abs(E0))) << test::name(tier);
+  }
+}
+
+TEST(Energy, StaysBoundedOverManySwings) {
+  const model::Chain chain = test::paper_5_1();
+  const double scale = rbd::energy_scale(chain);
+  Integrator integrator(chain, {.dt_s = 0.02});
+  State s = integrator.start(VectorXd::Zero(3), VectorXd::Zero(3));
+  const double E0 = integrator.energy(s);
+  double early = 0, late = 0;
+  for (int k = 0; k < 200000; ++k) {
+    ASSERT_TRUE(integrator.step(s, VectorXd::Zero(3)).usable());
+    double& worst = k < 100000 ? early : late;
+    worst = std::max(worst, std::abs(integrator.energy(s) - E0) / scale);
+  }
+  EXPECT_LT(early, 4e-5);
+  EXPECT_LT(late, 1.1 * early);
+}
+
+}  // namespace
+}  // namespace hamel::dynamics

@@ -1,0 +1,116 @@
+// The barrier's parts: the shortest vector under inequalities, and the second derivative of a distance.
+#include <gtest/gtest.h>
+
+#include "common/rbd/rbd.h"
+#include "services/planner/core/barrier.h"
+#include "services/planner/core/least_norm.h"
+#include "tests/support/planner_scene.h"
+
+namespace hamel::planner {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+Eigen::MatrixXd random_rows(test::Random& rng, int n, int rows) {
+  Eigen::MatrixXd C(n, rows);
+  for (int i = 0; i < rows; ++i) C.col(i) = rng.vector(n, 1).normalized();
+  return C;
+}
+
+// Karush, Kuhn, Tucker: x = C u, u >= 0, C^T x >= s, u (C^T x - s) = 0 decide the one solution.
+TEST(LeastNorm, MeetsTheConditionsOfAMinimum) {
+  test::Random rng(1);
+  int solved = 0, infeasible = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const int n = 1 + k % 7, rows = 1 + static_cast<int>(rng.uniform(0, 15));
+    Eigen::MatrixXd C = random_rows(rng, n, rows);
+    if (rng.coin(0.3) && rows > 1) C.col(rows - 1) = C.col(0);   // twins
+    const VectorXd s = rng.vector(rows, 1).array() - 0.4;
+    LeastNorm solver(n, rows);
+    const auto outcome = solver.solve(C, s, rows);
+    ASSERT_NE(outcome, LeastNorm::Outcome::out_of_steps);
+    const VectorXd &x = solver.x(), &u = solver.multipliers(), slack = C.transpose() * x - s;
+    ASSERT_LE((x - C * u).norm(), 1e-8 * (1 + u.norm()));
+    ASSERT_GE(u.minCoeff(), 0);
+    if (outcome == LeastNorm::Outcome::infeasible) {
+      ++infeasible;
+      continue;
+    }
+    ++solved;
+    ASSERT_GE(slack.minCoeff(), -1e-8);
+    ASSERT_LE(std::abs(u.dot(slack)), 1e-7 * (1 + u.norm()));
+  }
+  EXPECT_GT(solved, 5000);
+  EXPECT_GT(infeasible, 1000);
+}
+
+TEST(LeastNorm, KnowsAContradiction) {
+  Eigen::MatrixXd C(2, 2);
+  C << 1, -1, 0, 0;
+  LeastNorm solver(2, 2);
+  EXPECT_EQ(solver.solve(C, Eigen::Vector2d(1, -0.5), 2), LeastNorm::Outcome::infeasible);
+  EXPECT_EQ(solver.solve(C, Eigen::Vector2d(1, -1), 2), LeastNorm::Outcome::solved);
+  EXPECT_NEAR(solver.x()[0], 1, 1e-15);
+  EXPECT_EQ(solver.solve(C, Eigen::Vector2d(-1, -1), 2), LeastNorm::Outcome::solved);
+  EXPECT_TRUE(solver.x().isZero(0));
+}
+
+// hdd from a chain's own motion: Jacobian, bias and curvature against differences of the distance in time, with every
+// joint velocity constant (qdd = 0) and the obstacle flying and turning.
+class ForObstacle : public testing::TestWithParam<geometry::Shape> {};
+
+TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
+  test::Random rng(2);
+  int compared = 0;
+  for (int k = 0; k < 400; ++k) {
+    scene::Robot robot{"r", "", test::random_chain(rng, 4), {}};
+    robot.shapes.push_back(test::link_capsule(3, rng.vec3(0.4), rng.vec3(0.4), 0.05));
+    scene::PlannerOptions options;
+    options.rho0_m = 1e3;
+    Arm arm(robot.chain);
+    Obstacles obstacles;
+    Pairs pairs(robot, options);
+    const VectorXd q = rng.vector(4, 3), qd = rng.vector(4, 1);
+    geometry::Obstacle o;
+    o.shape = GetParam();
+    o.X_WO = rng.pose(1);
+    o.V_WO << rng.vec3(1), rng.vec3(1);
+    const auto distance = [&](double t) {
+      arm.update(q + t * qd, qd);
+      geometry::Obstacle moved = o;
+      moved.X_WO.p += t * o.V_WO.tail<3>();
+      const Vector3d turn = t * o.V_WO.head<3>();
+      moved.X_WO.R = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix() * o.X_WO.R;
+      obstacles.take({&moved, 1}, 0, options);
+      pairs.find(arm, obstacles);
+      return pairs.items()[0].at;
+    };
+    const double h = 1e-4;
+    const geometry::Closest before = distance(-h), after = distance(h), now = distance(0);
+    const bool same_feature = before.slides_on_link == after.slides_on_link && now.distance_m > 0.05 &&
+                              before.obstacle_axis.isZero() == after.obstacle_axis.isZero() &&
+                              std::isfinite(before.centre_m) == std::isfinite(after.centre_m);
+    if (!same_feature) continue;
+    pairs.complete(arm);
+    const Pair& pair = pairs.items()[0];
+    const Vector3d bias = rbd::point_bias_acceleration(arm.chain, arm.ws, 3, now.on_axis, arm.qd);
+    const double rate = -pair.n.dot(pair.v_relative);
+    const double second = -pair.n.dot(bias) + distance_curvature(pair, arm.angular_velocity(3));
+    EXPECT_NEAR(rate, (after.distance_m - before.distance_m) / (2 * h), 1e-5) << k;
+    const double measured = (after.distance_m - 2 * now.distance_m + before.distance_m) / (h * h);
+    // an obstacle that turns accelerates its own points; the planner leaves that out
+    const Vector3d arm_o = now.on_axis + now.centre_m * now.normal - o.X_WO.p;
+    const Vector3d omega = o.V_WO.head<3>();
+    EXPECT_NEAR(second + pair.n.dot(omega.cross(omega.cross(arm_o))), measured, 2e-3 * (1 + std::abs(measured))) << k;
+    ++compared;
+  }
+  EXPECT_GT(compared, 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Obstacles, ForObstacle,
+                         testing::Values(geometry::Shape{geometry::ShapeKind::sphere, {0.1, 0, 0}},
+                                         geometry::Shape{geometry::ShapeKind::capsule, {0.1, 0.8, 0}}));
+
+}  // namespace
+}  // namespace hamel::planner

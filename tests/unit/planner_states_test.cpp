@@ -1,0 +1,278 @@
+// The state machine: every state and reason, and what the torque does in it.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/support/planner_scene.h"
+
+namespace hamel::test {
+namespace {
+
+using planner::Input;
+using planner::Output;
+using planner::Planner;
+using planner::Reason;
+using planner::State;
+using scene::Method;
+
+// A planar arm bent to the left, its tip near (2, 2), one obstacle far away.
+struct Bench {
+  scene::Robot robot = planar_arm(4, 1.0 / 12, 0.05);
+  scene::PlannerOptions options;
+  std::vector<geometry::Obstacle> obstacles{sphere(1, {-3, 0, 0}, 0.2)};
+  Eigen::VectorXd q = Eigen::Vector4d(0, M_PI / 2, 0, -M_PI / 4), qd = Eigen::VectorXd::Zero(4);
+  scene::Goal goal;
+  double obstacle_age_s = 0, state_age_s = 0, t_s = 0, dt_s = 1e-3;
+  bool expected = false;
+
+  Bench() {
+    options.barrier_gain = 12;
+    goal.id = 1;
+    goal.X_WG.p = {1, 2.5, 0};
+  }
+  Input input() const {
+    return {.step = 0,
+            .t_s = t_s,
+            .dt_s = dt_s,
+            .q = q,
+            .qd = qd,
+            .obstacles = obstacles,
+            .obstacle_age_s = obstacle_age_s,
+            .state_age_s = state_age_s,
+            .obstacles_expected = expected};
+  }
+  Output plan(bool with_goal = true) const {
+    Planner p(robot, options);
+    if (with_goal) p.set_goal(goal);
+    Output out = p.output();
+    p.plan(input(), out);
+    return out;
+  }
+  RunResult go(double duration_s) const { return run(robot, obstacles, options, goal, q, dt_s, duration_s); }
+};
+
+void expect(const Output& out, State state, Reason reason) {
+  EXPECT_EQ(out.report.state, state) << planner::to_string(out.report.state);
+  EXPECT_EQ(out.report.reason, reason) << planner::to_string(out.report.reason);
+  EXPECT_NE(std::string(out.report.detail), "");
+}
+
+TEST(States, IdleWithoutGoalOnlyDamps) {
+  Bench b;
+  b.qd.setConstant(0.1);
+  b.options.barrier_gain = 0;
+  const Output out = b.plan(false);
+  expect(out, State::idle, Reason::none);
+  EXPECT_LT(out.torque_Nm.dot(b.qd), 0);
+}
+
+TEST(States, MovingToReachedAfterStayingThere) {
+  const Bench b;
+  expect(b.plan(), State::moving, Reason::none);
+  const RunResult r = b.go(10);
+  EXPECT_EQ(r.last.state, State::reached);
+  EXPECT_GT(r.reached_at_s, 0.5);
+  EXPECT_GT(r.last.path_length_m, 0.7);
+}
+
+TEST(States, GoalAtTheStartIsReachedAfterTheHold) {
+  Bench b;
+  Planner p(b.robot, b.options);
+  Output out = b.plan();
+  b.goal.X_WG.p = out.report.end_effector_m;
+  p.set_goal(b.goal);
+  for (int k = 0; k <= 101; ++k, b.t_s = k * 1e-3) {
+    p.plan(b.input(), out);
+    EXPECT_EQ(out.report.state == State::reached, b.t_s >= 0.1 - 1e-12) << b.t_s;
+  }
+}
+
+TEST(States, ContactIsUnsafeAndBrakesUntilClear) {
+  Bench b;
+  b.qd.setConstant(0.5);
+  b.options.method = Method::attract;
+  Planner p(b.robot, b.options);
+  p.set_goal(b.goal);
+  Output out = p.output();
+  b.obstacles[0] = sphere(1, {0.5, 0.2, 0}, 0.2);
+  p.plan(b.input(), out);
+  expect(out, State::unsafe, Reason::contact);
+  EXPECT_LT(out.torque_Nm.dot(b.qd), 0);
+  EXPECT_EQ(out.report.contacts, 1u);
+  b.obstacles[0] = sphere(1, {0.5, 0.255, 0}, 0.2);  // 5 mm: free, yet nearer than dmin
+  p.plan(b.input(), out);
+  expect(out, State::unsafe, Reason::contact);
+  b.obstacles[0] = sphere(1, {0.5, 0.27, 0}, 0.2);
+  p.plan(b.input(), out);
+  expect(out, State::moving, Reason::none);
+  EXPECT_NEAR(out.report.clearance_min_m, -0.05, 1e-12);
+}
+
+TEST(States, BrakeStopsWithinATenthOfASecond) {
+  Bench b;
+  b.qd = Eigen::Vector4d(2, -3, 1, 4);
+  b.state_age_s = 1;
+  Planner p(b.robot, b.options);
+  p.set_goal(b.goal);
+  Output out = p.output();
+  for (const double dt_s : {1e-3, 0.02}) {
+    scene::DynamicsOptions o;
+    o.dt_s = b.dt_s = dt_s;
+    dynamics::Integrator dynamics(b.robot.chain, o);
+    dynamics::State s = dynamics.start(b.q, b.qd);
+    for (double t = 0; t < 0.1 - 1e-9; t += dt_s) {
+      const Input in{.dt_s = dt_s, .q = s.q, .qd = s.qd, .obstacles = {}, .state_age_s = 1};
+      p.plan(in, out);
+      expect(out, State::unsafe, Reason::stale_state);
+      ASSERT_TRUE(dynamics.step(s, out.torque_Nm).usable());
+    }
+    EXPECT_LT(s.qd.lpNorm<Eigen::Infinity>(), 0.02) << dt_s;
+  }
+}
+
+TEST(States, OldObstaclesSlowThenStop) {
+  Bench b;
+  b.options.vmax_mps = 0.5;
+  const double fresh = b.plan().torque_Nm.norm();
+  b.obstacle_age_s = 0.2;
+  const Output slow = b.plan();
+  expect(slow, State::moving, Reason::none);
+  EXPECT_NEAR(slow.torque_Nm.norm() / fresh, 0.5, 0.01);
+  b.obstacle_age_s = 0.31;
+  expect(b.plan(), State::unsafe, Reason::stale_obstacles);
+}
+
+TEST(States, WaitsForTheFirstObstaclesWhereSomeAreExpected) {
+  Bench b;
+  b.obstacles.clear();
+  b.obstacle_age_s = scene::kInf;
+  expect(b.plan(), State::moving, Reason::none);
+  b.expected = true;
+  const Output out = b.plan();
+  expect(out, State::idle, Reason::stale_obstacles);
+  EXPECT_TRUE(out.torque_Nm.isZero());
+  b.obstacle_age_s = 0;  // an explicit empty set
+  expect(b.plan(), State::moving, Reason::none);
+}
+
+TEST(States, NotFiniteIsUnsafe) {
+  Bench b;
+  b.obstacles[0].X_WO.p[1] = std::nan("");
+  expect(b.plan(), State::unsafe, Reason::non_finite);
+  b = Bench();
+  b.q[2] = std::nan("");
+  const Output out = b.plan();
+  expect(out, State::unsafe, Reason::non_finite);
+  EXPECT_TRUE(out.torque_Nm.isZero());
+}
+
+TEST(States, MisfitIsAFault) {
+  Bench b;
+  b.goal.kind = scene::GoalKind::joints;
+  b.goal.joints = Eigen::VectorXd::Zero(3);
+  expect(b.plan(), State::fault, Reason::configuration);
+  b = Bench();
+  b.dt_s = 0;
+  expect(b.plan(), State::fault, Reason::configuration);
+  b = Bench();
+  b.q = Eigen::VectorXd::Zero(5);
+  expect(b.plan(), State::fault, Reason::internal);
+}
+
+TEST(States, UnreachableIsSaidAtOnceAndNotTried) {
+  Bench b;
+  b.goal.X_WG.p = {3, 3, 0};
+  const Output out = b.plan();
+  expect(out, State::stuck, Reason::unreachable);
+  EXPECT_TRUE(out.torque_Nm.isZero());
+}
+
+TEST(States, BlockedGoalIsNamed) {
+  Bench b;
+  b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
+  const RunResult r = b.go(30);
+  EXPECT_EQ(r.last.state, State::stuck);
+  EXPECT_EQ(r.last.reason, Reason::goal_blocked);
+  EXPECT_EQ(r.contact_at_s, -1);
+}
+
+TEST(States, JointLimitIsNamed) {
+  Bench b;
+  model::ChainSpec spec = b.robot.chain.spec();
+  for (model::Joint& j : spec.joints) j.limits.upper = 0.6, j.limits.lower = -0.6;
+  b.robot.chain = checked(spec);
+  b.options.limit_weight = 100;
+  b.q.setZero();
+  b.obstacles.clear();
+  const RunResult r = b.go(10);
+  EXPECT_EQ(r.last.state, State::stuck);
+  EXPECT_EQ(r.last.reason, Reason::joint_limit);
+  EXPECT_LT(r.q.lpNorm<Eigen::Infinity>(), 0.6 + 1e-3);  // the barrier holds the limits
+}
+
+TEST(States, NewGoalAfterReachedMovesOn) {
+  Bench b;
+  Planner p(b.robot, b.options);
+  Output out = b.plan();
+  b.goal.X_WG.p = out.report.end_effector_m;
+  p.set_goal(b.goal);
+  for (int k = 0; k < 200; ++k, b.t_s += 1e-3) p.plan(b.input(), out);
+  EXPECT_EQ(out.report.state, State::reached);
+  b.goal.id = 2;
+  b.goal.X_WG.p[0] += 0.5;
+  p.set_goal(b.goal);
+  p.plan(b.input(), out);
+  expect(out, State::moving, Reason::none);
+  EXPECT_EQ(out.report.goal_id, 2u);
+  EXPECT_LT(out.report.time_to_goal_s, 0);
+  p.clear_goal();
+  p.plan(b.input(), out);
+  expect(out, State::idle, Reason::none);
+}
+
+TEST(States, RampBeginsWithAHold) {
+  Bench b;
+  Planner p(b.robot, b.options);
+  p.set_goal(b.goal);
+  p.ramp_in();
+  Output out = p.output();
+  const double full = b.plan().torque_Nm.norm();
+  p.plan(b.input(), out);
+  EXPECT_TRUE(out.torque_Nm.isZero());
+  b.t_s = 0.1;
+  p.plan(b.input(), out);
+  EXPECT_NEAR(out.torque_Nm.norm() / full, 0.5, 1e-9);
+  b.t_s = 0.3;
+  p.plan(b.input(), out);
+  EXPECT_NEAR(out.torque_Nm.norm() / full, 1, 1e-9);
+}
+
+TEST(Goals, JointTargetIsReached) {
+  Bench b;
+  b.goal.kind = scene::GoalKind::joints;
+  b.goal.joints = Eigen::Vector4d(0.5, 0.5, -0.5, 1);
+  b.options.vmax_mps = 1;
+  const RunResult r = b.go(15);
+  EXPECT_EQ(r.last.state, State::reached);
+  EXPECT_LT((r.q - b.goal.joints).lpNorm<Eigen::Infinity>(), 0.01);
+}
+
+TEST(Goals, PoseIsReachedInOrientationToo) {
+  Bench b;
+  b.goal.kind = scene::GoalKind::pose;
+  b.goal.X_WG.R = Eigen::AngleAxisd(2.5, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const RunResult r = b.go(15);
+  EXPECT_EQ(r.last.state, State::reached);
+  EXPECT_LT(r.last.orientation_error_rad, 0.02);
+  EXPECT_NEAR(std::remainder(r.q.sum() - 2.5, 2 * M_PI), 0, 0.02);
+}
+
+TEST(Goals, MovingTargetIsFollowed) {
+  Bench b;
+  b.goal.V_WG.tail<3>() = Eigen::Vector3d(-0.1, 0, 0);
+  const RunResult r = b.go(8);
+  EXPECT_LT(r.last.target_error_m, 0.01);
+}
+
+}  // namespace
+}  // namespace hamel::test
