@@ -57,7 +57,7 @@ struct Stream {
   double scale = 1;                  ///< of lengths, > 0
   double rate = 1;                   ///< stream seconds per run second, > 0
   double start_s = 0;                ///< stream time at run time 0
-  bool loop = false;                 ///< starts anew one sample interval after its end
+  bool loop = false;                 ///< begins anew, one sample interval behind its end
   std::vector<StreamSample> samples; ///< what the file holds, in stream frame and stream time
 };
 

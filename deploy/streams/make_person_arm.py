@@ -38,7 +38,7 @@ def main():
         for k in range(RATE_HZ * DURATION_S):
             t = k / RATE_HZ
             for i, (p, r) in enumerate(zip(arm(t), RADII_M)):
-                out.write(f"{t:.4f},{i},{p[0]:.4f},{p[1]:.4f},{p[2]:.4f},{r}\n")
+                out.write(f"{t:.6f},{i},{p[0]:.4f},{p[1]:.4f},{p[2]:.4f},{r}\n")
 
 
 if __name__ == "__main__":

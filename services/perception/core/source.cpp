@@ -104,9 +104,10 @@ geometry::Obstacle Source::place(std::size_t frame, const scene::StreamSample& s
   Eigen::Vector3d v_S = Eigen::Vector3d::Zero();  // stream lengths per stream second
   out.velocity_known = true;
   const double since_s = stream_t_s - frames_[frame].t_s;
-  if (const auto* next =
-          frame + 1 < frames_.size() && !is_gap(frame) ? find(frame + 1, sample.id) : nullptr) {
-    const double span_s = frames_[frame + 1].t_s - frames_[frame].t_s;
+  const bool wraps = stream_.loop && frame + 1 == frames_.size();
+  const bool goes_on = wraps || (frame + 1 < frames_.size() && !is_gap(frame));
+  if (const auto* next = goes_on ? find(wraps ? 0 : frame + 1, sample.id) : nullptr) {
+    const double span_s = (wraps ? end_s_ : frames_[frame + 1].t_s) - frames_[frame].t_s;
     v_S = (next->p_m - sample.p_m) / span_s;
     radius_m += (next->radius_m - sample.radius_m) * (since_s / span_s);
   } else if (const auto* last = frame > 0 && !is_gap(frame - 1) ? find(frame - 1, sample.id) : nullptr) {
@@ -134,7 +135,7 @@ bool Source::at(double t_s, std::vector<geometry::Obstacle>& out) const {
 }
 
 /// The first grid point behind t_s.
-double Source::grid_after(double t_s) const { return (std::floor(t_s * rate_hz_ + kOnGrid) + 1) / rate_hz_; }
+double Source::grid_after(double t_s) const { return (std::floor(t_s * rate_hz_ + kOnGrid) + 1) * period_s(); }
 
 double Source::next_time(double t_s) const {
   if (is_static()) return kInf;

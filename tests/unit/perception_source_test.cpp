@@ -1,0 +1,213 @@
+// Where obstacles are at a time: scripted motions and streams sampled anew.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "services/perception/core/source.h"
+
+namespace hamel::perception {
+namespace {
+
+using geometry::Obstacle;
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+scene::ScriptedObstacle sphere(std::uint32_t id, const Eigen::Vector3d& p) {
+  scene::ScriptedObstacle o;
+  o.at_start.id = id;
+  o.at_start.shape.dims_m[0] = 0.1;
+  o.at_start.X_WO.p = p;
+  return o;
+}
+
+scene::PerceptionOptions with_stream(std::vector<scene::StreamSample> samples) {
+  scene::PerceptionOptions o;
+  o.stream.emplace().samples = std::move(samples);
+  return o;
+}
+
+Source make(const scene::PerceptionOptions& o) {
+  auto r = Source::make(o);
+  if (!r) throw std::runtime_error(to_string(r.error().front()));
+  return std::move(r).value();
+}
+
+std::vector<Obstacle> at(const Source& s, double t_s) {
+  std::vector<Obstacle> out;
+  EXPECT_TRUE(s.at(t_s, out)) << t_s;
+  return out;
+}
+
+TEST(Source, RefusesOptionsThatBreakARule) {
+  scene::PerceptionOptions o;
+  o.rate_hz = -1;
+  EXPECT_FALSE(Source::make(o));
+}
+
+TEST(Source, WithoutObstaclesIsAnEmptyStaticSet) {
+  const Source s = make({});
+  EXPECT_TRUE(s.is_static());
+  EXPECT_TRUE(at(s, 0).empty());
+  EXPECT_EQ(s.next_time(0), kInf);
+}
+
+TEST(Source, StandingObstaclesChangeNever) {
+  scene::PerceptionOptions o;
+  o.obstacles = {sphere(5, {1, 2, 3})};
+  const Source s = make(o);
+  EXPECT_TRUE(s.is_static());
+  EXPECT_EQ(s.next_time(3), kInf);
+  EXPECT_EQ(at(s, 1e6)[0].X_WO.p, Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(at(s, 0)[0].velocity_known);
+}
+
+TEST(Source, LinearMotionIsExact) {
+  scene::PerceptionOptions o;
+  o.obstacles = {sphere(1, {1, 0, 0})};
+  o.obstacles[0].velocity_mps = {0, 2, 0};
+  const Source s = make(o);
+  EXPECT_FALSE(s.is_static());
+  EXPECT_EQ(at(s, 1.5)[0].X_WO.p, Eigen::Vector3d(1, 3, 0));
+  EXPECT_EQ(at(s, 1.5)[0].V_WO.tail<3>(), Eigen::Vector3d(0, 2, 0));
+  EXPECT_NEAR(s.next_time(0), 1.0 / 30, 1e-15);
+}
+
+TEST(Source, SinusoidsVelocityIsThatOfItsPosition) {
+  scene::PerceptionOptions o;
+  o.obstacles = {sphere(1, {0, 0, 1})};
+  o.obstacles[0].amplitude_m = {0.3, 0, -0.1};
+  o.obstacles[0].frequency_hz = 0.7;
+  o.obstacles[0].phase_rad = 0.4;
+  const Source s = make(o);
+  for (const double t : {0.0, 0.31, 2.0}) {
+    const double h = 1e-5;
+    const Eigen::Vector3d v = (at(s, t + h)[0].X_WO.p - at(s, t - h)[0].X_WO.p) / (2 * h);
+    EXPECT_LT((v - at(s, t)[0].V_WO.tail<3>()).norm(), 1e-8) << t;
+  }
+}
+
+TEST(Source, GridVisitsEveryPeriodOnceForLongTimes) {
+  scene::PerceptionOptions o;
+  o.obstacles = {sphere(1, {0, 0, 0})};
+  o.obstacles[0].velocity_mps = {1, 0, 0};
+  const Source s = make(o);
+  double t = 0;
+  for (int k = 1; k <= 30000; ++k) {
+    t = s.next_time(t);
+    ASSERT_DOUBLE_EQ(t, k / 30.0);
+  }
+}
+
+TEST(Source, StreamIsInterpolatedWithTheVelocityOfTheLine) {
+  auto o = with_stream({{0, 1, {0, 0, 0}, 0.1}, {0.4, 1, {0.4, 0, 0}, 0.2}});
+  o.stream->X_WS.p = {0, 0, 5};
+  o.stream->X_WS.R << 0, -1, 0, 1, 0, 0, 0, 0, 1;  // x of the stream is y of the world
+  o.stream->scale = 2;
+  o.stream->rate = 0.5;
+  const Source s = make(o);
+  const Obstacle x = at(s, 0.4).at(0);  // 0.2 s of the stream
+  EXPECT_LT((x.X_WO.p - Eigen::Vector3d(0, 0.4, 5)).norm(), 1e-15);
+  EXPECT_LT((x.V_WO.tail<3>() - Eigen::Vector3d(0, 1, 0)).norm(), 1e-15);
+  EXPECT_NEAR(x.shape.dims_m[0], 0.3, 1e-15);
+  EXPECT_TRUE(x.velocity_known);
+}
+
+TEST(Source, StreamIsSampledAtLeastThirtyTimesASecond) {
+  auto o = with_stream({{0, 1, {0, 0, 0}, 0.1}, {0.4, 1, {1, 0, 0}, 0.1}});
+  o.rate_hz = 5;
+  EXPECT_NEAR(make(o).period_s(), 1.0 / 30, 1e-15);
+  o.rate_hz = 100;
+  EXPECT_NEAR(make(o).period_s(), 0.01, 1e-15);
+}
+
+TEST(Source, IdsComeAndGo) {
+  const Source s = make(with_stream({{0, 1, {0, 0, 0}, 1},
+                                     {0, 2, {5, 0, 0}, 1},
+                                     {0.1, 1, {1, 0, 0}, 1},
+                                     {0.2, 1, {2, 0, 0}, 1},
+                                     {0.2, 3, {9, 0, 0}, 1}}));
+  EXPECT_EQ(at(s, 0.05).size(), 2u);
+  const Obstacle lonely = at(s, 0.05)[1];  // seen once: stands, with unknown velocity
+  EXPECT_EQ(lonely.id, 2u);
+  EXPECT_FALSE(lonely.velocity_known);
+  EXPECT_EQ(lonely.X_WO.p.x(), 5);
+  EXPECT_EQ(at(s, 0.1).size(), 1u);
+  EXPECT_EQ(at(s, 0.2).size(), 2u);
+  EXPECT_NEAR(at(s, 0.25)[0].X_WO.p.x(), 2.5, 1e-12);  // goes on with its last velocity
+  EXPECT_TRUE(at(s, 0.31).empty());                    // and is over one interval later
+}
+
+TEST(Source, EndIsOneEmptySetAndThenNothing) {
+  const Source s = make(with_stream({{0, 1, {0, 0, 0}, 1}, {0.1, 1, {1, 0, 0}, 1}}));
+  double t = 0, last = 0;
+  int sets = 1;
+  for (; (t = s.next_time(t)) < kInf; ++sets) last = t;
+  EXPECT_EQ(sets, 7);  // 0, 1/30 .. 6/30 = end
+  EXPECT_TRUE(at(s, last).empty());
+}
+
+TEST(Source, LoopRepeatsItself) {
+  auto o = with_stream({{2, 1, {0, 0, 0}, 1}, {2.1, 1, {1, 0, 0}, 1}, {2.2, 1, {0, 0, 0}, 1}});
+  o.stream->start_s = 2;
+  o.stream->loop = true;
+  const Source s = make(o);
+  for (const double t : {0.0, 0.03, 0.17, 0.29}) {
+    EXPECT_NEAR(at(s, t)[0].X_WO.p.x(), at(s, t + 0.3)[0].X_WO.p.x(), 1e-12) << t;
+    EXPECT_NEAR(at(s, t)[0].X_WO.p.x(), at(s, t + 3000)[0].X_WO.p.x(), 1e-7) << t;
+  }
+  EXPECT_LT(s.next_time(1e5), 1e5 + 0.04);
+}
+
+TEST(Source, GapIsSilenceNotAnEmptySet) {
+  const Source s = make(with_stream(
+      {{0, 1, {0, 0, 0}, 1}, {0.1, 1, {1, 0, 0}, 1}, {2.05, 1, {2, 0, 0}, 1}, {2.1, 1, {3, 0, 0}, 1}}));
+  std::vector<Obstacle> out(3);
+  EXPECT_TRUE(s.at(0.1, out));
+  EXPECT_FALSE(s.at(0.5, out));
+  EXPECT_TRUE(out.empty());
+  EXPECT_FALSE(s.at(2.04, out));
+  EXPECT_TRUE(s.at(2.05, out));
+  const double next = s.next_time(0.1);
+  EXPECT_GE(next, 2.05);
+  EXPECT_LT(next, 2.05 + 1.0 / 30 + 1e-12);
+  EXPECT_EQ(at(s, next).size(), 1u);
+}
+
+TEST(Source, GapThatEndsJustBehindAGridPointIsLeft) {
+  const Source s =
+      make(with_stream({{0, 1, {0, 0, 0}, 1}, {2 + 1e-9, 1, {2, 0, 0}, 1}, {2.1, 1, {3, 0, 0}, 1}}));
+  EXPECT_GE(s.next_time(0), 2 + 1e-9);
+  EXPECT_LT(s.next_time(0), 2.07);
+}
+
+TEST(Source, BeforeItsFirstSampleThereIsNothing) {
+  auto o = with_stream({{5, 1, {0, 0, 0}, 1}, {5.1, 1, {1, 0, 0}, 1}});
+  o.stream->start_s = 4;
+  const Source s = make(o);
+  EXPECT_TRUE(at(s, 0.5).empty());
+  EXPECT_EQ(at(s, 1.0).size(), 1u);
+}
+
+TEST(Source, ScriptedComeFirstAndRoomForAllIsKnown) {
+  auto o = with_stream({{0, 9, {0, 0, 0}, 1}, {0, 4, {0, 0, 0}, 1}, {0.1, 4, {0, 0, 0}, 1}});
+  o.obstacles = {sphere(20, {0, 0, 0})};
+  const Source s = make(o);
+  const auto all = at(s, 0);
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(all[0].id, 20u);
+  EXPECT_EQ(all[1].id, 4u);
+  EXPECT_EQ(all[2].id, 9u);
+  EXPECT_EQ(s.most_obstacles(), 3u);
+}
+
+TEST(Source, SameTimeSameBitsInAnyOrder) {
+  auto o = with_stream({{0, 1, {0, 0.1, 0}, 1}, {0.033, 1, {0.7, 0, 0}, 1}, {0.066, 1, {1, 0.3, 0}, 1}});
+  o.stream->loop = true;
+  const Source s = make(o);
+  std::vector<Eigen::Vector3d> forth;
+  for (int k = 0; k < 100; ++k) forth.push_back(at(s, 0.0123 * k)[0].X_WO.p);
+  for (int k = 99; k >= 0; --k) EXPECT_EQ(at(s, 0.0123 * k)[0].X_WO.p, forth[static_cast<std::size_t>(k)]);
+}
+
+}  // namespace
+}  // namespace hamel::perception
