@@ -67,6 +67,7 @@ std::string configuration(const NodeOptions& options, const Interface& interface
   const std::string general =
       element("Interfaces", "<NetworkInterface address=\"" + interface.address + "\"/>") +
       element("AllowMulticast", peers.empty() ? "spdp" : "false");
+  // Cyclone tries indices below the maximum.
   const std::string discovery = element("ParticipantIndex", "auto") +
                                 element("MaxAutoParticipantIndex", std::to_string(kMaxParticipantIndex + 1)) +
                                 element("LeaseDuration", kLease) + element("SPDPInterval", kAnnouncement) +
