@@ -70,6 +70,7 @@ class Node {
  public:
   virtual ~Node() = default;
   /// Never null; std::runtime_error with one sentence when the vendor refuses (out of memory or sockets).
+  /// `topic` must outlive the node: the constants of idl/topics.h do.
   virtual std::unique_ptr<Writer> writer(const Topic& topic) = 0;
   virtual std::unique_ptr<Reader> reader(const Topic& topic) = 0;
   /// Waits until a sample arrived or wake() was called since the last wait(), or until the deadline.
@@ -88,6 +89,6 @@ Result<Vendor, Problem> vendor_from(std::string_view name);
 
 /// The vendor used where none is asked for by services in their own processes (chosen by measurement, see
 /// common/bus/README.md).
-inline constexpr Vendor kDefaultNetworkVendor = Vendor::fastdds;
+inline constexpr Vendor kDefaultNetworkVendor = Vendor::cyclonedds;
 
 }  // namespace hamel::bus

@@ -175,7 +175,10 @@ ddsi_sertype_ops type_ops() {
     std::fill_n(to, n, nullptr);
   };
   ops.free_samples = [](const ddsi_sertype*, void**, std::size_t, dds_free_op_t) {};
-  ops.equal = [](const ddsi_sertype* a, const ddsi_sertype* b) { return &topic_of(a) == &topic_of(b); };
+  ops.equal = [](const ddsi_sertype* a, const ddsi_sertype* b) {
+    const Topic &s = topic_of(a), &t = topic_of(b);
+    return s.type == t.type && s.keyed == t.keyed && s.max_bytes == t.max_bytes;
+  };
   ops.hash = [](const ddsi_sertype* t) {
     const std::string_view name = topic_of(t).type;
     return ddsrt_mh3(name.data(), name.size(), 0);

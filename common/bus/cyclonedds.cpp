@@ -67,6 +67,7 @@ std::string configuration(const NodeOptions& options, const Interface& interface
   const std::string general =
       element("Interfaces", "<NetworkInterface address=\"" + interface.address + "\"/>") +
       element("AllowMulticast", peers.empty() ? "spdp" : "false");
+  // Cyclone tries indices below the maximum.
   const std::string discovery = element("ParticipantIndex", "auto") +
                                 element("MaxAutoParticipantIndex", std::to_string(kMaxParticipantIndex + 1)) +
                                 element("LeaseDuration", kLease) + element("SPDPInterval", kAnnouncement) +
@@ -114,9 +115,9 @@ struct Events {
       : topic(t), options(o), notifier(n), we_write(writes) {}
 
   void incompatible_with(std::uint32_t policy, std::int32_t change) {
-    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
     if (!logged.exchange(true) && options.log)
       options.log(incompatible_sentence(topic, we_write, static_cast<int>(policy), Vendor::cyclonedds));
+    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
   }
 
   const Topic& topic;

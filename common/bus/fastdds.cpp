@@ -46,9 +46,9 @@ struct Events {
   Events(const Topic& t, const NodeOptions& o, bool writes) : topic(t), options(o), we_write(writes) {}
 
   void incompatible_with(int policy, int change) {
-    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
     if (!logged.exchange(true) && options.log)
       options.log(incompatible_sentence(topic, we_write, policy, Vendor::fastdds));
+    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
   }
 
   const Topic& topic;

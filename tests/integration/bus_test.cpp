@@ -5,7 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cstring>
 #include <map>
+#include <mutex>
 #include <set>
 #include <thread>
 
@@ -40,11 +43,13 @@ std::uint32_t number_in(const Payload& p) {
   return number;
 }
 
-std::unique_ptr<bus::Node> open(Vendor vendor, std::uint32_t domain) {
+using Log = std::function<void(const std::string&)>;
+
+std::unique_ptr<bus::Node> open(Vendor vendor, std::uint32_t domain, Log log = {}) {
   bus::NodeOptions options;
   options.vendor = vendor;
   options.domain = domain;
-  options.log = [](const std::string& line) { std::fprintf(stderr, "bus: %s\n", line.c_str()); };
+  options.log = std::move(log);
   auto node = bus::open(options);
   if (!node) throw std::runtime_error(to_string(node.error()));
   return std::move(node).value();
@@ -69,8 +74,12 @@ struct Pair {
 
 class Bus : public testing::TestWithParam<Pair> {
  protected:
-  std::unique_ptr<bus::Node> from(std::uint32_t n) { return open(GetParam().from, GetParam().domain + n); }
-  std::unique_ptr<bus::Node> to(std::uint32_t n) { return open(GetParam().to, GetParam().domain + n); }
+  std::unique_ptr<bus::Node> from(std::uint32_t n, Log log = {}) {
+    return open(GetParam().from, GetParam().domain + n, std::move(log));
+  }
+  std::unique_ptr<bus::Node> to(std::uint32_t n, Log log = {}) {
+    return open(GetParam().to, GetParam().domain + n, std::move(log));
+  }
 };
 
 TEST_P(Bus, StreamKeepsOrderAndLosesNothing) {
@@ -266,6 +275,31 @@ TEST_P(Bus, WakeEndsAWaitFromAnyThread) {
   other.join();
   b->wake();
   EXPECT_TRUE(b->wait(std::chrono::steady_clock::now() + kDeadline)) << "a wake before the wait counts";
+}
+
+/// A reader that asks for what its writer does not offer: counted on both sides and said once.
+TEST_P(Bus, DisagreementAboutQosIsCountedAndSaidOnce) {
+  if (GetParam().from == Vendor::inproc) return;  // one process cannot disagree with itself
+  Topic stream = topics::kGoal;
+  stream.delivery = Delivery::stream;
+  std::mutex mutex;
+  std::vector<std::string> said;
+  const auto log = [&](const std::string& line) {
+    std::lock_guard lock(mutex);
+    said.push_back(line);
+  };
+  const auto a = from(12, log), b = to(12, log);
+  const auto writer = a->writer(stream);
+  const auto reader = b->reader(topics::kGoal);
+  ASSERT_TRUE(wait_for(
+      *b, [&] { return writer->counters().incompatible > 0 && reader->counters().incompatible > 0; }));
+  EXPECT_EQ(writer->matched(), 0);
+  std::lock_guard lock(mutex);
+  ASSERT_EQ(said.size(), 2U);
+  for (const std::string& line : said) {
+    EXPECT_NE(line.find("hamel/v1/goal"), std::string::npos) << line;
+    EXPECT_NE(line.find("durability"), std::string::npos) << line;
+  }
 }
 
 std::string name_of(const testing::TestParamInfo<Pair>& info) {
