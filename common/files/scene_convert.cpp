@@ -103,6 +103,7 @@ void read_planner_forces(const Fields& read, scene::PlannerOptions& o) {
   read("kp", o.kp);
   read("kv", o.kv);
   read("vmax_mps", o.vmax_mps);
+  read("angular_vmax_radps", o.angular_vmax_radps);
   read("amax", o.amax);
   read("damping", o.damping);
   read("eta", o.eta);

@@ -23,6 +23,7 @@ void check_forces(const PlannerOptions& o, Rules& r) {
   r.positive("kp", o.kp);
   r.positive("kv", o.kv);
   r.positive_or_inf("vmax_mps", o.vmax_mps);
+  r.positive_or_inf("angular_vmax_radps", o.angular_vmax_radps);
   r.positive_or_inf("amax", o.amax);
   r.not_negative("damping", o.damping);
   r.not_negative("eta", o.eta);
