@@ -91,6 +91,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"planner.kv", "> 0", [](Scene& s) { s.planner.kv = kNan; }},
         Case{"planner.vmax_mps", "> 0", [](Scene& s) { s.planner.vmax_mps = 0; }},
         Case{"planner.angular_vmax_radps", "> 0", [](Scene& s) { s.planner.angular_vmax_radps = 0; }},
+        Case{"planner.stale_state_s", "> 0", [](Scene& s) { s.planner.stale_state_s = 0; }},
+        Case{"planner.brake_rate", "> 0", [](Scene& s) { s.planner.brake_rate = 0; }},
         Case{"planner.amax", "> 0", [](Scene& s) { s.planner.amax = -1; }},
         Case{"planner.damping", ">= 0", [](Scene& s) { s.planner.damping = -1; }},
         Case{"planner.eta", ">= 0", [](Scene& s) { s.planner.eta = -1; }},
