@@ -103,6 +103,7 @@ void read_planner_forces(const Fields& read, scene::PlannerOptions& o) {
   read("kp", o.kp);
   read("kv", o.kv);
   read("vmax_mps", o.vmax_mps);
+  read("angular_vmax_radps", o.angular_vmax_radps);
   read("amax", o.amax);
   read("damping", o.damping);
   read("eta", o.eta);
@@ -135,6 +136,8 @@ void read_planner(const Fields& read, scene::PlannerOptions& o, std::string& bus
   read("stale_brake_s", o.stale_brake_s);
   read("stale_slow_s", o.stale_slow_s);
   read("assumed_speed_mps", o.assumed_speed_mps);
+  read("stale_state_s", o.stale_state_s);
+  read("brake_rate", o.brake_rate);
   read("ramp_s", o.ramp_s);
   read("bus", bus);
 }

@@ -23,6 +23,7 @@ void check_forces(const PlannerOptions& o, Rules& r) {
   r.positive("kp", o.kp);
   r.positive("kv", o.kv);
   r.positive_or_inf("vmax_mps", o.vmax_mps);
+  r.positive_or_inf("angular_vmax_radps", o.angular_vmax_radps);
   r.positive_or_inf("amax", o.amax);
   r.not_negative("damping", o.damping);
   r.not_negative("eta", o.eta);
@@ -52,6 +53,8 @@ void check_states(const PlannerOptions& o, Rules& r) {
   r.positive("stale_slow_s", o.stale_slow_s);
   r.must(!(o.stale_slow_s > o.stale_brake_s), "stale_slow_s", o.stale_slow_s,
          "<= stale_brake_s = " + number(o.stale_brake_s));
+  r.positive("stale_state_s", o.stale_state_s);
+  r.positive("brake_rate", o.brake_rate);
   r.not_negative("assumed_speed_mps", o.assumed_speed_mps);
   r.not_negative("ramp_s", o.ramp_s);
 }

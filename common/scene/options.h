@@ -20,21 +20,22 @@ enum class Start : std::uint8_t { extrapolated, previous };
 /// How the arm is integrated.
 struct DynamicsOptions {
   Tier tier = Tier::midpoint;
-  double dt_s = 1e-3;                ///< time step, > 0
-  double alpha = 0.5;                ///< tier hamel: where in the step (9) takes the velocity, in [0, 1]
-  int stages = 4;                    ///< tier gauss: 1..8, order 2 * stages
-  Root root = Root::feedback;        ///< Eq. (16), or Newton with the exact recursive Jacobian
-  Start start = Start::extrapolated; ///< first guess of the increment; `previous` is the paper's q^{k+1} = q^k
-  double tolerance_Nm = 0;           ///< stop when |residual|_inf is below; 0: scaled with momentum, to rounding
-  double tolerance_rel = 1e-10;      ///< dopri8: relative local error
-  int max_iterations = 32;           ///< root-finding budget of one step, >= 1
-  int max_subdivisions = 6;          ///< a step that does not converge is halved up to this often, 0..20
-  double stop_stiffness = 0;         ///< smooth hard stops at joint limits [N m/rad], 0: none
+  double dt_s = 1e-3;          ///< time step, > 0
+  double alpha = 0.5;          ///< tier hamel: where in the step (9) takes the velocity, in [0, 1]
+  int stages = 4;              ///< tier gauss: 1..8, order 2 * stages
+  Root root = Root::feedback;  ///< Eq. (16), or Newton with the exact recursive Jacobian
+  Start start =
+      Start::extrapolated;       ///< first guess of the increment; `previous` is the paper's q^{k+1} = q^k
+  double tolerance_Nm = 0;       ///< stop when |residual|_inf is below; 0: scaled with momentum, to rounding
+  double tolerance_rel = 1e-10;  ///< dopri8: relative local error
+  int max_iterations = 32;       ///< root-finding budget of one step, >= 1
+  int max_subdivisions = 6;      ///< a step that does not converge is halved up to this often, 0..20
+  double stop_stiffness = 0;     ///< smooth hard stops at joint limits [N m/rad], 0: none
 };
 
 enum class Method : std::uint8_t { attract, khatib, gyro_paper, gyro };
-enum class GainForm : std::uint8_t { F1, F2, F3, S };         ///< planner.md 1.3, 1.4: readings of Eq. (20)
-enum class Mapping : std::uint8_t { paper, force, symmetric };///< Eq. (21) verbatim; J^T f; powerless
+enum class GainForm : std::uint8_t { F1, F2, F3, S };  ///< readings of Eq. (20); S: scaled with speed
+enum class Mapping : std::uint8_t { paper, force, symmetric };  ///< Eq. (21) verbatim; J^T f; powerless
 enum class PairPolicy : std::uint8_t { nearest, all };
 
 /// How the arm is steered.  Defaults are for a planar arm of unit links; scenes say their own.
@@ -53,28 +54,29 @@ struct PlannerOptions {
   GainForm gain_form = GainForm::S;
   Mapping mapping = Mapping::symmetric;
   PairPolicy pairs = PairPolicy::all;
-  bool relative_velocity = true;     ///< gyro force from the velocity relative to the obstacle
-  double phi_min_rad = 1.0 / 3.0;    ///< F2: exp(1/max(phi, phi_min)), > 0
-  double c0 = 0.2;                   ///< S: closing gate, in (0, 1]
-  double lambda2 = 1e-3;             ///< damping of operational-space inertia, > 0
-  bool lambda2_relative = true;      ///< true: times trace(J M^-1 J^T); false: absolute [1/kg]
-  double dmin_m = 0.01;              ///< clearance the barrier keeps, >= 0; barrier off where barrier_gain is 0
-  double barrier_gain = 0;           ///< g of planner.md 1.7 [1/s], 0: off
-  double kc = 0;                     ///< held-direction circulation, 0 or > 1 (1 allowed on spatial arms)
-  double flip_time_s = 3;            ///< circulation flips when the error has not fallen 10 % in it, > 0
-  double limit_weight = 0;           ///< wl of planner.md 1.11, 0: plain attraction
-  double progress_window_s = 3;      ///< STUCK when no 10 % progress in it, > 0
-  double goal_tolerance_m = 0.01;    ///< REACHED within, > 0
-  double goal_tolerance_rad = 0.02;  ///< pose goals: REACHED within, > 0
-  double goal_tolerance_joint = 0.01;///< joint goals: each joint within, > 0
-  double goal_speed = 0.05;          ///< REACHED below [m/s], > 0
-  double goal_hold_s = 0.1;          ///< REACHED after so long, >= 0
-  double stale_brake_s = 0.3;        ///< obstacles older than this: stop and UNSAFE, > 0
-  double stale_slow_s = 0.1;         ///< obstacles older than this: slow down, > 0
-  double stale_state_s = 0.05;       ///< arm state older than this: brake and UNSAFE, > 0
-  double brake_rate = 60;            ///< bmax: braking is qdd = -bmax qd [1/s], > 0
-  double assumed_speed_mps = 0;      ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
-  double ramp_s = 0.2;               ///< after a restart without memory the command ramps in over it, >= 0
+  bool relative_velocity = true;   ///< gyro force from the velocity relative to the obstacle
+  double phi_min_rad = 1.0 / 3.0;  ///< F2: exp(1/max(phi, phi_min)), > 0
+  double c0 = 0.2;                 ///< S: closing gate, in (0, 1]
+  double lambda2 = 1e-3;           ///< damping of operational-space inertia, > 0
+  bool lambda2_relative = true;    ///< true: times trace(J M^-1 J^T); false: absolute [1/kg]
+  double dmin_m = 0.01;            ///< clearance the barrier keeps, >= 0; barrier off where barrier_gain is 0
+  double barrier_gain = 0;         ///< of the barrier, h.. + 2 g h. + g^2 h >= 0 [1/s], 0: off
+  double kc = 0;                   ///< held-direction circulation, 0 or > 1 (1 allowed on spatial arms)
+  double flip_time_s = 3;          ///< circulation flips when the error has not fallen 10 % in it, > 0
+  double limit_weight = 0;         ///< of joints near their limits in the attraction, 0: plain
+  double progress_window_s = 3;    ///< STUCK when no 10 % progress in it, > 0
+  double goal_tolerance_m = 0.01;  ///< REACHED within, > 0
+  double goal_tolerance_rad = 0.02;    ///< pose goals: REACHED within, > 0
+  double goal_tolerance_joint = 0.01;  ///< joint goals: each joint within, > 0
+  double goal_speed = 0.05;            ///< REACHED below [m/s], > 0
+  double goal_hold_s = 0.1;            ///< REACHED after so long, >= 0
+  double stale_brake_s = 0.3;          ///< obstacles older than this: stop and UNSAFE, > 0
+  double stale_slow_s = 0.1;           ///< obstacles older than this: slow down, > 0
+  double stale_state_s = 0.05;         ///< arm state older than this: brake and UNSAFE, > 0
+  double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
+  double assumed_speed_mps =
+      0;                ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
+  double ramp_s = 0.2;  ///< after a restart without memory the command ramps in over it, >= 0
 };
 
 enum class Pace : std::uint8_t { lockstep, realtime };

@@ -16,58 +16,60 @@ namespace hamel::scene {
 
 /// A solid fixed to a link, for distances.
 struct LinkShape {
-  int link = -1;                     ///< 0..n-1; -1: the base, which does not move
+  int link = -1;  ///< 0..n-1; -1: the base, which does not move
   geometry::Shape shape;
-  lie::Pose X_LS;                    ///< shape frame in the link's frame
+  lie::Pose X_LS;  ///< shape frame in the link's frame
 };
 
 /// A chain, what surrounds its links, and the text it came from.
 struct Robot {
   std::string name;
-  std::string urdf;                  ///< the file's text, for the wire and for recordings
+  std::string urdf;  ///< the file's text, for the wire and for recordings
   model::Chain chain;
   std::vector<LinkShape> shapes;
-  std::vector<std::string> warnings = {}; ///< what was read otherwise than written, e.g. "link hand: mesh left out"
+  std::vector<std::string> warnings =
+      {};  ///< what was read otherwise than written, e.g. "link hand: mesh left out"
 };
 
 enum class GoalKind : std::uint8_t { position, pose, joints };
 
 /// Where the end effector (or every joint) should go.
 struct Goal {
-  std::uint64_t id = 0;              ///< newest id wins; the scene's own is 1
+  std::uint64_t id = 0;  ///< newest id wins; the scene's own is 1
   GoalKind kind = GoalKind::position;
-  lie::Pose X_WG;                    ///< position: only p; world frame
-  lie::Twist V_WG = lie::Twist::Zero();   ///< motion of the target, world axes
-  Eigen::VectorXd joints;            ///< kind joints: n values [rad or m]
+  lie::Pose X_WG;                        ///< position: only p; world frame
+  lie::Twist V_WG = lie::Twist::Zero();  ///< motion of the target, world axes
+  Eigen::VectorXd joints;                ///< kind joints: n values [rad or m]
 };
 
 /// A scripted obstacle: where it is at t = 0 and how it moves.  Exactly one motion.
 struct ScriptedObstacle {
   geometry::Obstacle at_start;
-  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();     ///< constant velocity, or
-  Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();      ///< p(t) = p0 + amplitude sin(2 pi f t + phase)
+  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< constant velocity, or
+  Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();   ///< p(t) = p0 + amplitude sin(2 pi f t + phase)
   double frequency_hz = 0;
   double phase_rad = 0;
 };
 
 /// A recorded obstacle stream, CSV t_s,id,x_m,y_m,z_m,radius_m, placed in the world.
 struct Stream {
-  std::string path;                  ///< as found: absolute, or relative to the working directory
-  lie::Pose X_WS;                    ///< stream frame in the world
-  double scale = 1;                  ///< of lengths, > 0
-  double rate = 1;                   ///< stream seconds per run second, > 0
-  double start_s = 0;                ///< stream time at run time 0
-  bool loop = false;                 ///< begins anew, one sample interval behind its end
-  std::vector<StreamSample> samples; ///< what the file holds, in stream frame and stream time
+  std::string path;                   ///< as found: absolute, or relative to the working directory
+  lie::Pose X_WS;                     ///< stream frame in the world
+  double scale = 1;                   ///< of lengths, > 0
+  double rate = 1;                    ///< stream seconds per run second, > 0
+  double start_s = 0;                 ///< stream time at run time 0
+  bool loop = false;                  ///< begins anew, one sample interval behind its end
+  std::vector<StreamSample> samples;  ///< what the file holds, in stream frame and stream time
 };
 
 struct PerceptionOptions {
-  double rate_hz = 30;               ///< obstacle sets per second, > 0; static scenes publish on change
+  double rate_hz = 30;  ///< obstacle sets per second, > 0; static scenes publish on change
   std::vector<ScriptedObstacle> obstacles;
   std::optional<Stream> stream;
 };
 
-/// The bus each service talks over: "inproc", "fastdds" or "cyclonedds"; empty: whatever the program was told.
+/// The bus each service talks over: "inproc", "fastdds" or "cyclonedds"; empty: whatever the program was
+/// told.
 struct Buses {
   std::string dynamics, planner, perception;
 };
@@ -75,17 +77,17 @@ struct Buses {
 /// One run.
 struct Scene {
   std::string name;
-  std::string text;                  ///< the file's text after --set, for recordings
-  std::uint32_t arm = 1;             ///< key of the arm on the wire
+  std::string text;       ///< the file's text after --set, for recordings
+  std::uint32_t arm = 1;  ///< key of the arm on the wire
   Robot robot;
-  Eigen::VectorXd q0, qd0;           ///< start [rad, rad/s], sizes n
-  std::optional<Goal> goal;          ///< none: the arm is not steered and the planner stays IDLE
-  bool steered = true;               ///< false: free motion, no planner, no perception (5.1)
+  Eigen::VectorXd q0, qd0;   ///< start [rad, rad/s], sizes n
+  std::optional<Goal> goal;  ///< none: the arm is not steered and the planner stays IDLE
+  bool steered = true;       ///< false: free motion, no planner, no perception (5.1)
   DynamicsOptions dynamics;
   PlannerOptions planner;
   PerceptionOptions perception;
   Buses bus;
-  double duration_s = 10;            ///< length of the run, > 0
+  double duration_s = 10;  ///< length of the run, > 0
   StopRule stop = StopRule::when_reached;
 };
 

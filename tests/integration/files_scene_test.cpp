@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 
 #include "common/files/scene_text.h"
 
@@ -114,6 +115,25 @@ TEST(SceneText, DefaultsAreThoseOfTheOptions) {
   EXPECT_FALSE(s.goal);
   EXPECT_EQ(s.bus.planner, "");
   EXPECT_EQ(s.text, kRobot);
+}
+
+TEST(SceneText, EveryNumberOfTheOptionsCanBeSet) {
+  const Scratch file(kRobot);
+  const auto text = read_file(std::string(HAMEL_SOURCE_DIR) + "/common/scene/options.h");
+  ASSERT_TRUE(text);
+  const std::regex member("\n  (double|int) (\\w+) = ");
+  const std::size_t planner = text.value().find("struct PlannerOptions");
+  int count = 0;
+  for (std::sregex_iterator m(text.value().begin(), text.value().end(), member), end; m != end;
+       ++m, ++count) {
+    const std::string part = static_cast<std::size_t>(m->position()) < planner ? "dynamics." : "planner.";
+    const std::string set = part + m->str(2) + "=-7";  // breaks a rule of every one of them
+    const auto scene = load_scene(file.path(), {set});
+    ASSERT_FALSE(scene) << set;
+    EXPECT_NE(scene.error().front().what.find(part + m->str(2) + " = -7, must be"), std::string::npos)
+        << to_string(scene.error().front());
+  }
+  EXPECT_GE(count, 35);
 }
 
 TEST(SceneText, EnumerationsHaveTheNamesOfTheOptions) {

@@ -135,7 +135,9 @@ bool Source::at(double t_s, std::vector<geometry::Obstacle>& out) const {
 }
 
 /// The first grid point behind t_s.
-double Source::grid_after(double t_s) const { return (std::floor(t_s * rate_hz_ + kOnGrid) + 1) * period_s(); }
+double Source::grid_after(double t_s) const {
+  return (std::floor(t_s * rate_hz_ + kOnGrid) + 1) * period_s();
+}
 
 double Source::next_time(double t_s) const {
   if (is_static()) return kInf;
