@@ -54,8 +54,9 @@ std::optional<Problem> CsvWriter::finish() {
   return std::nullopt;
 }
 
-Monitor::Monitor(bus::Node& node, const scene::Scene& scene, std::unique_ptr<CsvWriter> csv, bool live)
+Monitor::Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv, bool live)
     : scene_(scene),
+      pace_(pace),
       state_in_(node),
       report_in_(node),
       summary_in_(node),
@@ -84,7 +85,9 @@ bool Monitor::poll(Time now) {
   show(now);
 
   if (!finished_ && summary_ && summary_->final_summary) {
-    const bool last_report = !scene_.steered || (report_ && report_->step >= summary_->steps);
+    // In real time the planner reports each 10 ms, not each step.
+    const bool lockstep = pace_ == scene::Pace::lockstep;
+    const bool last_report = !scene_.steered || !lockstep || (report_ && report_->step >= summary_->steps);
     finished_ = last_report || now - final_heard_ > kLastWords;
   }
   if (!finished_ && now - last_heard_ > kPatience) finished_ = true;
@@ -117,6 +120,8 @@ void Monitor::take_reports() {
   wire::PlannerReport r;
   while (report_in_.take(r)) {
     if (r.arm != scene_.arm) continue;
+    // When the run is over the planner hears no more states and says so: that is not how the run went.
+    if (summary_ && summary_->final_summary && r.reason == wire::Reason::stale_state) continue;
     ++reports_;
     clearance_min_m_ = std::min(clearance_min_m_, r.clearance_min_m);
     contacts_ = std::max(contacts_, r.contacts);

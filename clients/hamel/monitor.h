@@ -48,7 +48,7 @@ class CsvWriter {
 class Monitor final : public runtime::Service {
  public:
   /// `live`: a status line on stderr.  `csv` may be null.
-  Monitor(bus::Node& node, const scene::Scene& scene, std::unique_ptr<CsvWriter> csv, bool live);
+  Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv, bool live);
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   /// The run is over and its last report is here, or nothing was heard for `patience`.
@@ -67,6 +67,7 @@ class Monitor final : public runtime::Service {
   void show(Time now);
 
   const scene::Scene& scene_;
+  const scene::Pace pace_;
   wire::Subscription<wire::ArmState> state_in_;
   wire::Subscription<wire::PlannerReport> report_in_;
   wire::Subscription<wire::RunSummary> summary_in_;

@@ -47,7 +47,7 @@ int run(const RunArgs& args) {
   if (!perception) return runtime::complain("hamel run", perception.error());
   auto planner = planner::PlannerService::make(n, s, {.pace = pace, .state_dir = args.run.state_dir});
   if (!planner) return runtime::complain("hamel run", {planner.error()});
-  Monitor monitor(n, s, std::move(csv), !args.json);
+  Monitor monitor(n, s, pace, std::move(csv), !args.json);
 
   // Perception first: in lockstep its sets are there before the planner looks for them.
   std::vector<runtime::Service*> services{arm.value().get()};

@@ -100,7 +100,7 @@ int up(const RunArgs& args) {
     return runtime::complain("hamel up", {{state_dir, "cannot make the folder: " + e.message()}});
   }
 
-  Monitor monitor(n, s, std::move(csv), !args.json);
+  Monitor monitor(n, s, pace, std::move(csv), !args.json);
   Supervisor supervisor;
   if (s.steered)
     for (const char* name : {"perception", "planner"}) supervisor.add(name, command(name, args, s, pace, state_dir));

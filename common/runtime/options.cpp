@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "common/files/scene_text.h"
+#include "common/runtime/log.h"
 #include "common/wire/codec.h"
 
 namespace hamel::runtime {
@@ -35,7 +36,9 @@ void add_run_options(CLI::App& app, RunOptions& o) {
 
 Checked<scene::Scene> load(const RunOptions& o) {
   auto s = files::load_scene(o.scene_path, o.overrides);
-  if (s && o.duration_s > 0) s.value().duration_s = o.duration_s;
+  if (!s) return s;
+  if (o.duration_s > 0) s.value().duration_s = o.duration_s;
+  for (const auto& w : scene::warnings(s.value())) spdlog::warn("{}: {}", o.scene_path, w);
   return s;
 }
 

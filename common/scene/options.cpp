@@ -37,7 +37,7 @@ void check_forces(const PlannerOptions& o, Rules& r) {
   r.must(o.kc == 0 || (o.kc >= 1 && std::isfinite(o.kc)), "kc", o.kc, "0 or >= 1 (planar arms: > 1)");
   r.positive("flip_time_s", o.flip_time_s);
   r.not_negative("limit_weight", o.limit_weight);
-  if (o.barrier_gain > 0)
+  if (o.method == Method::gyro && o.barrier_gain > 0)
     r.must(o.dmin_m < o.rho0_m, "dmin_m", o.dmin_m,
            "< rho0_m = " + number(o.rho0_m) + " while the barrier is on");
 }

@@ -60,8 +60,8 @@ struct PlannerOptions {
   double lambda2 = 1e-3;           ///< damping of operational-space inertia, > 0
   bool lambda2_relative = true;    ///< true: times trace(J M^-1 J^T); false: absolute [1/kg]
   double dmin_m = 0.01;            ///< clearance the barrier keeps, >= 0; barrier off where barrier_gain is 0
-  double barrier_gain = 0;         ///< of the barrier, h.. + 2 g h. + g^2 h >= 0 [1/s], 0: off
-  double kc = 0;                   ///< held-direction circulation, 0 or > 1 (1 allowed on spatial arms)
+  double barrier_gain = 12;        ///< gyro: of the barrier, h.. + 2 g h. + g^2 h >= 0 [1/s], 0: off
+  double kc = 2;                   ///< gyro: held-direction circulation, 0 or > 1 (1 allowed on spatial arms)
   double flip_time_s = 3;          ///< circulation flips when the error has not fallen 10 % in it, > 0
   double limit_weight = 0;         ///< of joints near their limits in the attraction, 0: plain
   double progress_window_s = 3;    ///< STUCK when no 10 % progress in it, > 0

@@ -195,7 +195,7 @@ std::vector<std::string> warnings(const Scene& s) {
   std::vector<std::string> out = s.robot.warnings;
   const PlannerOptions& o = s.planner;
   const double closing = o.vmax_mps + top_speed_mps(s.perception);  // the barrier needs g rho0 >= it
-  if (s.steered && o.barrier_gain > 0 && o.barrier_gain * o.rho0_m < closing)
+  if (s.steered && o.method == Method::gyro && o.barrier_gain > 0 && o.barrier_gain * o.rho0_m < closing)
     out.push_back("planner.barrier_gain * rho0_m = " + number(o.barrier_gain * o.rho0_m) +
                   " m/s is below the largest closing speed " + number(closing) +
                   " m/s: the barrier may come too late");
