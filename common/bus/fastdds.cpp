@@ -17,7 +17,9 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <map>
+#include <mutex>
 #include <random>
+#include <set>
 #include <stdexcept>
 #include <variant>
 
@@ -177,6 +179,35 @@ T& checked(T* made, const char* what, const Topic& topic) {
   return *made;
 }
 
+/// Fast DDS numbers the participants of a process, upwards for ever if left to itself, and ends the program
+/// (exit) when a number gives a port over 65535.  So each takes the lowest number that is free in this
+/// process.
+class ParticipantNumber {
+ public:
+  ParticipantNumber() {
+    std::lock_guard lock(mutex());
+    while (!taken().insert(number_).second) ++number_;
+  }
+  ~ParticipantNumber() {
+    std::lock_guard lock(mutex());
+    taken().erase(number_);
+  }
+  ParticipantNumber(const ParticipantNumber&) = delete;
+  ParticipantNumber& operator=(const ParticipantNumber&) = delete;
+  int get() const { return number_; }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex m;
+    return m;
+  }
+  static std::set<int>& taken() {
+    static std::set<int> s;
+    return s;
+  }
+  int number_ = 0;
+};
+
 class FastNode final : public Node {
  public:
   explicit FastNode(const NodeOptions& options) : options_(options) {}
@@ -187,7 +218,8 @@ class FastNode final : public Node {
   }
 
   /// False when Fast DDS refuses.
-  bool start(const dds::DomainParticipantQos& qos) {
+  bool start(dds::DomainParticipantQos qos) {
+    qos.wire_protocol().participant_id = number_.get();
     auto* factory = dds::DomainParticipantFactory::get_instance();
     participant_ = factory->create_participant(options_.domain, qos);
     if (participant_ == nullptr) return false;
@@ -233,6 +265,7 @@ class FastNode final : public Node {
   }
 
   const NodeOptions options_;
+  const ParticipantNumber number_;
   Notifier notifier_;
   std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
   std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
@@ -274,7 +307,7 @@ dds::DomainParticipantQos participant_qos(const NodeOptions& options, const Inte
   wire.prefix = random_prefix();
   wire.builtin.discovery_config.leaseDuration = duration(kLease);
   wire.builtin.discovery_config.leaseDuration_announcementperiod = duration(kAnnouncement);
-  // Ports by hand: Fast DDS's own participant numbers are unique in a process, not in a domain.
+  // Ports by hand: Fast DDS's participant numbers are unique in a process, not in a domain.
   wire.builtin.metatrafficUnicastLocatorList.push_back(
       locator(interface.address, metatraffic_port(options.domain, index)));
   wire.default_unicast_locator_list.push_back(locator(interface.address, user_port(options.domain, index)));
