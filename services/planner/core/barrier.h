@@ -34,7 +34,7 @@ class Barrier {
   Outcome solve(const Arm& arm, Pairs& pairs, Eigen::VectorXd& a) noexcept;
 
  private:
-  void add_row(const Arm& arm, double b) noexcept;
+  void add_row(const Arm& arm, double b, double least_mobility) noexcept;
   void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
   void add_joint_rows(const Arm& arm) noexcept;
 

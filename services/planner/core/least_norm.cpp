@@ -8,7 +8,7 @@ namespace hamel::planner {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kDependent = 1e-6;  // a unit column nearer than this to the span of others lies in it
+constexpr double kDependent = 1e-4;  // a unit column nearer than this to the span of others lies in it
 constexpr double kMet = 1e-9;        // a row missed by less, relatively, is met
 constexpr int kMostSteps = 200;
 
