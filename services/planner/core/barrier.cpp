@@ -12,10 +12,10 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// A row that joints act on with less than this part of the end effector's mobility is one nothing can be done about
-// (an obstacle coming at the pedestal): trying would throw the arm about.
+// A row that joints act on with less than this part of the end effector's mobility is one nothing can be done
+// about (an obstacle coming at the pedestal): trying would throw the arm about.
 constexpr double kImmovable = 1e-4;
-constexpr double kWildest = 1e3;              // no joint is accelerated harder by the barrier [rad/s^2 or m/s^2]
+constexpr double kWildest = 1e3;       // no joint is accelerated harder by the barrier [rad/s^2 or m/s^2]
 constexpr double kLimitHorizon = 0.5;  // joint rows begin so far from a limit [rad or m]
 
 }  // namespace
