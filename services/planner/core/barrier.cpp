@@ -12,7 +12,10 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kImmovable = 1e-12;   // a row no joint can act on
+// A row that joints act on with less than this part of the end effector's mobility is one nothing can be done
+// about (an obstacle coming at the pedestal): trying would throw the arm about.
+constexpr double kImmovable = 1e-4;
+constexpr double kWildest = 1e3;       // no joint is accelerated harder by the barrier [rad/s^2 or m/s^2]
 constexpr double kLimitHorizon = 0.5;  // joint rows begin so far from a limit [rad or m]
 
 }  // namespace
@@ -51,12 +54,12 @@ Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options)
 }
 
 // A_.col(rows_) is filled; finishes the row unless nothing can act on it.
-void Barrier::add_row(const Arm& arm, double b) noexcept {
+void Barrier::add_row(const Arm& arm, double b, double least_mobility) noexcept {
   auto c = C_.col(rows_);
   c = A_.col(rows_);
   arm.M_llt.matrixL().solveInPlace(c);
   const double length = c.norm();
-  if (!(length * length > kImmovable) || !std::isfinite(b)) return;
+  if (!(length * length > least_mobility) || !std::isfinite(b)) return;
   c /= length;
   length_[rows_] = length;
   b_[rows_] = b;
@@ -67,6 +70,8 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
   const double g = options_.barrier_gain;
   const auto items = pairs.items();
   pair_of_row_.clear();
+  const auto J_tip = arm.J_E.bottomRows<3>();
+  const double least = kImmovable * J_tip.cwiseProduct(J_tip.lazyProduct(arm.M_inverse)).sum();
   for (std::size_t k = 0; k < items.size(); ++k) {
     Pair& pair = items[k];
     pair.multiplier = 0;
@@ -76,7 +81,7 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
     const double curvature = std::min(distance_curvature(pair, omega), 0.0);
     A_.col(rows_).noalias() = -pairs.J(k).transpose().lazyProduct(pair.n);
     const Eigen::Index before = rows_;
-    add_row(arm, -2 * g * hd - g * g * h + pair.n.dot(bias) - curvature);
+    add_row(arm, -2 * g * hd - g * g * h + pair.n.dot(bias) - curvature, least);
     if (rows_ > before) pair_of_row_.push_back(k);
   }
 }
@@ -86,7 +91,7 @@ void Barrier::add_joint_rows(const Arm& arm) noexcept {
   const auto row = [&](int j, double sign, double b) {  // sign * a_j >= b
     A_.col(rows_).setZero();
     A_(j, rows_) = sign;
-    add_row(arm, b);
+    add_row(arm, b, 0);
   };
   for (int j = 0; j < arm.n(); ++j) {
     const model::JointLimits& limits = arm.chain.joint(j).limits;
@@ -111,6 +116,11 @@ Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, VectorXd& a) noexc
   outcome.infeasible = found != LeastNorm::Outcome::solved;
   x_ = least_norm_.x();
   arm.M_llt.matrixU().solveInPlace(x_);
+  const double largest = x_.lpNorm<Eigen::Infinity>();
+  if (largest > kWildest) {
+    x_ *= kWildest / largest;
+    outcome.infeasible = true;
+  }
   a += x_;
   for (std::size_t r = 0; r < pair_of_row_.size(); ++r) {
     const auto row = static_cast<Eigen::Index>(r);  // pairs come first

@@ -30,11 +30,11 @@ class Barrier {
   ///   joints:         the same with the distance to each limit near enough, and |qd| within the velocity
   ///   limit
   /// exactly, by an active-set method in x = L^T (a - a0), M = L L^T.  @param a  in: a0, out: the minimiser;
-  /// where infeasible: what meets the rows taken in before the contradiction, the most violated first
+  /// where infeasible: what meets the rows that can be met together, the cheapest first
   Outcome solve(const Arm& arm, Pairs& pairs, Eigen::VectorXd& a) noexcept;
 
  private:
-  void add_row(const Arm& arm, double b) noexcept;
+  void add_row(const Arm& arm, double b, double least_mobility) noexcept;
   void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
   void add_joint_rows(const Arm& arm) noexcept;
 

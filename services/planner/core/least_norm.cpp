@@ -8,7 +8,7 @@ namespace hamel::planner {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kDependent = 1e-6;  // a unit column nearer than this to the span of others lies in it
+constexpr double kDependent = 1e-7;  // a unit column nearer than this to the span of others lies in it
 constexpr double kMet = 1e-9;        // a row missed by less, relatively, is met
 constexpr int kMostSteps = 200;
 
@@ -22,32 +22,44 @@ LeastNorm::LeastNorm(Eigen::Index dimension, Eigen::Index most_rows)
       z_(x_),
       r_(x_),
       y_(x_) {
+  given_up_.resize(static_cast<std::size_t>(most_rows));
   active_.reserve(static_cast<std::size_t>(dimension) + 1);
   waiting_.reserve(static_cast<std::size_t>(dimension) + 1);
 }
 
 LeastNorm::Outcome LeastNorm::solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& s,
                                     Eigen::Index rows) noexcept {
-  x_.setZero();
-  u_.setZero();
-  active_.clear();
+  start();
+  std::fill(given_up_.begin(), given_up_.end(), char{0});
   steps_ = 0;
+  Outcome outcome = Outcome::solved;
   for (;;) {
-    const Eigen::Index p = most_violated(C, s, rows);
-    if (p < 0) return Outcome::solved;
-    if (!take_in(C, s, p)) return steps_ < kMostSteps ? Outcome::infeasible : Outcome::out_of_steps;
+    const Eigen::Index p = least_violated(C, s, rows);
+    if (p < 0) return outcome;
+    if (take_in(C, s, p)) continue;
+    if (steps_ >= kMostSteps) return Outcome::out_of_steps;
+    outcome = Outcome::infeasible;
+    given_up_[static_cast<std::size_t>(p)] = 1;  // and begin anew without it: x has already leaned toward it
+    start();
   }
 }
 
-Eigen::Index LeastNorm::most_violated(const Eigen::MatrixXd& C, const Eigen::VectorXd& s,
-                                      Eigen::Index rows) const noexcept {
-  Eigen::Index worst = -1;
-  double most = 0;
+void LeastNorm::start() noexcept {
+  x_.setZero();
+  u_.setZero();
+  active_.clear();
+}
+
+Eigen::Index LeastNorm::least_violated(const Eigen::MatrixXd& C, const Eigen::VectorXd& s,
+                                       Eigen::Index rows) const noexcept {
+  Eigen::Index cheapest = -1;
+  double least = kInfinity;
   for (Eigen::Index i = 0; i < rows; ++i) {
+    if (given_up_[static_cast<std::size_t>(i)]) continue;
     const double missing = s[i] - C.col(i).dot(x_);
-    if (missing > most && missing > kMet * (1 + std::abs(s[i]))) most = missing, worst = i;
+    if (missing < least && missing > kMet * (1 + std::abs(s[i]))) least = missing, cheapest = i;
   }
-  return worst;
+  return cheapest;
 }
 
 // Moves x along the part of row p that the active rows leave free until p holds, dropping active rows whose

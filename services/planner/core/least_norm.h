@@ -15,7 +15,8 @@ class LeastNorm {
   enum class Outcome { solved, infeasible, out_of_steps };
   /// min |x|  subject to  C.col(i) . x >= s[i] for i < rows.
   /// @param C  columns are unit vectors (dimension x at least rows)
-  /// Infeasible: x meets the rows taken in so far.  O(dimension k^2) a step, k active rows.  No allocation.
+  /// Infeasible: x meets the rows that could be met; the cheapest were taken in first, and a row that
+  /// contradicts them was given up.  O(dimension k^2) a step, k active rows.  No allocation.
   Outcome solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& s, Eigen::Index rows) noexcept;
 
   const Eigen::VectorXd& x() const noexcept { return x_; }
@@ -24,8 +25,9 @@ class LeastNorm {
   int steps() const noexcept { return steps_; }
 
  private:
-  Eigen::Index most_violated(const Eigen::MatrixXd& C, const Eigen::VectorXd& s,
-                             Eigen::Index rows) const noexcept;
+  void start() noexcept;
+  Eigen::Index least_violated(const Eigen::MatrixXd& C, const Eigen::VectorXd& s,
+                              Eigen::Index rows) const noexcept;
   bool take_in(const Eigen::MatrixXd& C, const Eigen::VectorXd& s, Eigen::Index p) noexcept;
   void project() noexcept;
   void append(Eigen::Index row) noexcept;
@@ -34,6 +36,7 @@ class LeastNorm {
   std::vector<Eigen::Index> active_, waiting_;  ///< rows that hold with equality; scratch
   Eigen::MatrixXd Q_, R_;                       ///< their columns = Q R, Q orthonormal
   Eigen::VectorXd x_, u_, z_, r_, y_;  ///< z: part of a column off the active ones; r: its part along them
+  std::vector<char> given_up_;
   int steps_ = 0;
 };
 

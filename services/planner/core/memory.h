@@ -44,13 +44,14 @@ struct Memory {
   Triple tip_m{};              ///< end effector in the last cycle
   double within_since_s = -1;  ///< inside tolerance and slow since then; < 0: not
   double time_to_goal_s = -1;
-  double best_error = 0;    ///< smallest scaled error that counted as progress
-  double progress_s = 0;    ///< when that was
-  double fast_s = 0;        ///< when the arm last moved faster than `goal_speed`
-  double turn_error = 0;    ///< scaled error the flip timer compares with
-  double turn_s = 0;        ///< when the flip timer started
-  double pressed_s = -std::numeric_limits<double>::infinity();  ///< when the attraction last pressed on something
-  std::uint64_t flips = 0;  ///< since the last progress
+  double best_error = 0;  ///< smallest scaled error that counted as progress
+  double progress_s = 0;  ///< when that was
+  double fast_s = 0;      ///< when the arm last moved faster than `goal_speed`
+  double turn_error = 0;  ///< scaled error the flip timer compares with
+  double turn_s = 0;      ///< when the flip timer started
+  double pressed_s =
+      -std::numeric_limits<double>::infinity();  ///< when the attraction last pressed on something
+  std::uint64_t flips = 0;                       ///< since the last progress
   double infeasible_s = -std::numeric_limits<double>::infinity();  ///< when the barrier last gave up
   double ramp_start_s = -1;                                        ///< < 0: no ramp
   std::uint64_t ramp_asked = 0;                                    ///< 1: starts with the next cycle
