@@ -46,18 +46,11 @@ void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<cons
                       Ref<const VectorXd> tau, Workspace& ws, Ref<VectorXd> qdd) noexcept {
   assert(q.size() == chain.n() && qd.size() == chain.n() && tau.size() == chain.n() &&
          qdd.size() == chain.n());
-  // The motion with qdd = 0 costs wrenches; what is left of tau after them meets M qdd.
+  // The motion with qdd = 0 costs wrenches; what they leave of tau meets M qdd.
   forward_sweep(q.data(), qd.data(), nullptr, ws);
-  Half6<double> F{};
-  for (int i = chain.n(); i-- > 0;) {
-    const std::size_t s = static_cast<std::size_t>(i);
-    const AxisLink& k = ws.axis[i];
-    F = F + ws.F[s];
-    qdd[i] = tau[i] - k.damping * qd[i] - along(k, F);
-    if (i > 0) F = to_parent(ws.X[s], F);
-  }
+  for (int i = 0; i < chain.n(); ++i) qdd[i] = tau[i] - ws.axis[i].damping * qd[i];
   factorise<double>(ws.axis, ws.X.data(), nullptr, ws.factor.data());
-  solve(ws.axis, ws.X.data(), ws.factor.data(), qdd.data(), ws.u.data(), qdd.data());
+  solve(ws.axis, ws.X.data(), ws.factor.data(), qdd.data(), ws.u.data(), qdd.data(), ws.F.data());
 }
 
 }  // namespace hamel::rbd

@@ -166,13 +166,15 @@ void factorise(const AxisChain& chain, const LinkPose<S>* X, const S* extra, Joi
     if (i > 0) I = to_parent(X[i], deflate(I, f[i]));
   }
 }
-/// x = (M + diag(extra))^-1 b from the factorisation, O(n).  x and b may be the same; `u` is scratch.
+/// x = (M + diag(extra))^-1 (b - A^T W) from the factorisation, O(n), where W_i is the sum of the wrenches `wrench`
+/// of link i and all beyond it (null: none).  x and b may be the same; `u` is scratch.
 template <class S>
-void solve(const AxisChain& chain, const LinkPose<S>* X, const JointFactor<S>* f, const S* b, S* u,
-           S* x) noexcept {
+void solve(const AxisChain& chain, const LinkPose<S>* X, const JointFactor<S>* f, const S* b, S* u, S* x,
+           const Half6<S>* wrench = nullptr) noexcept {
   Half6<S> p{};
   for (int i = chain.n(); i-- > 0;) {
     const AxisLink& k = chain[i];
+    if (wrench) p = p + wrench[i];
     u[i] = (b[i] - along(k, p)) * f[i].D_inv;
     if (i > 0) p = to_parent(X[i], p + u[i] * f[i].U);
   }

@@ -14,7 +14,8 @@ namespace hamel::dynamics {
 namespace {
 
 using Eigen::VectorXd;
-const Tier kTiers[] = {Tier::hamel, Tier::midpoint, Tier::gauss, Tier::semi_implicit_euler, Tier::rk4};
+const Tier kTiers[] = {Tier::hamel, Tier::midpoint, Tier::gauss, Tier::semi_implicit_euler,
+                       Tier::rk4,   Tier::dopri8};
 
 bool same(const State& a, const State& b) {
   return a.step == b.step && a.q == b.q && a.p == b.p && a.qd == b.qd && a.history == b.history;

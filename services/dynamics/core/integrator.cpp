@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/rbd/rbd.h"
+#include "services/dynamics/core/dopri8.h"
 #include "services/dynamics/core/gauss.h"
 #include "services/dynamics/core/midpoint.h"
 #include "services/dynamics/core/paper.h"
@@ -23,14 +24,15 @@ std::unique_ptr<TierStep> make_tier(const model::Chain& chain, const rbd::AxisCh
   switch (options.tier) {
     case Tier::hamel:
       return std::make_unique<PaperStep>(axis, options);
-    case Tier::rk4:
-      return std::make_unique<Rk4Step>(chain, axis, options);
-    case Tier::semi_implicit_euler:
-      return std::make_unique<SemiImplicitEulerStep>(chain, axis, options);
     case Tier::gauss:
       return std::make_unique<GaussStep>(axis, options);
-    case Tier::midpoint:
+    case Tier::rk4:
+      return std::make_unique<Rk4Step>(chain, axis, options);
     case Tier::dopri8:
+      return std::make_unique<Dopri8Step>(chain, axis, options);
+    case Tier::semi_implicit_euler:
+      return std::make_unique<SemiImplicitEulerStep>(chain, axis, options);
+    case Tier::midpoint:
       break;
   }
   return std::make_unique<MidpointStep>(axis, options);
