@@ -19,7 +19,7 @@ namespace hamel::client {
 namespace {
 
 constexpr int kSnapshots = 12;         // arms drawn along the run
-constexpr std::size_t kPathPoints = 2000;
+constexpr std::size_t kPathPoints = 800;
 
 struct Row {
   double t_s = 0, clearance_m = 0, energy_J = 0;
@@ -131,7 +131,7 @@ void add_arms(Script& s, const scene::Scene& scene, const std::vector<Row>& rows
   s.add("${} << EOD\n", block);
   for (int k = 0; k <= kSnapshots; ++k) {
     // More pictures early, where the arm moves, than late, where it rests.
-    const double part = std::pow(static_cast<double>(k) / kSnapshots, 2);
+    const double part = std::pow(static_cast<double>(k) / kSnapshots, 3);
     const Row& r = rows[static_cast<std::size_t>(part * static_cast<double>(rows.size() - 1))];
     rbd::positions(scene.robot.chain, r.q, ws);
     const auto& base = scene.robot.chain.X_WB0().p;
@@ -172,7 +172,7 @@ std::string script(const PlotArgs& args, const scene::Scene& scene, const std::v
   source.at(0, first);
 
   Script s;
-  s.add("set terminal {} size {},480 {}\nset output '{}'\n", png ? "pngcairo" : "svg", 480 * (views.size() + 1),
+  s.add("set terminal {} noenhanced size {},540 {}\nset output '{}'\n", png ? "pngcairo" : "svg", 480 * (views.size() + 1),
         png ? "" : "background 'white'", args.out_path);
   s.add("$path << EOD\n");
   const std::size_t stride = std::max<std::size_t>(1, rows.size() / kPathPoints);
@@ -188,7 +188,7 @@ std::string script(const PlotArgs& args, const scene::Scene& scene, const std::v
     add_obstacles(s, source, rows.back().t_s, 0, views[i], fmt::format("solid{}", i));
     add_obstacles(s, source, rows.back().t_s, scene.planner.rho0_m, views[i], fmt::format("reach{}", i));
   }
-  s.add("set multiplot layout 1,{} title '{}'\nset key bottom left\n", views.size() + 1, scene.name);
+  s.add("set multiplot layout 1,{} title '{}'\nset key outside bottom center horizontal\n", views.size() + 1, scene.name);
   for (std::size_t i = 0; i < views.size(); ++i) {
     const View& v = views[i];
     s.add("set size ratio -1\nset xlabel '{} [m]'\nset ylabel '{} [m]'\nplot ", v.label_across, v.label_up);
@@ -202,10 +202,10 @@ std::string script(const PlotArgs& args, const scene::Scene& scene, const std::v
   }
   s.add("set size noratio\nset xlabel 't [s]'\n");
   if (scene.steered)
-    s.add("set ylabel '[m]'\nset key top right\nset yrange [0:*]\nplot $path using 4:6 with lines lw 2 lc rgb '#228833' title 'distance to target', "
+    s.add("set ylabel '[m]'\nset yrange [0:*]\nplot $path using 4:6 with lines lw 2 lc rgb '#228833' title 'distance to target', "
           "$path using 4:5 with lines lw 2 lc rgb '#cc6644' title 'clearance'\n");
   else
-    s.add("set ylabel 'energy - energy(0) [J]'\nset key top right\nplot $path using 4:($7-({})) with lines lc rgb '#114488' notitle\n", rows[0].energy_J);
+    s.add("set ylabel 'energy - energy(0) [J]'\nplot $path using 4:($7-({})) with lines lc rgb '#114488' notitle\n", rows[0].energy_J);
   s.add("unset multiplot\n");
   return s.str();
 }
