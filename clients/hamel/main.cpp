@@ -3,6 +3,7 @@
 #include "clients/hamel/commands.h"
 #include "clients/hamel/plot.h"
 #include "clients/hamel/record.h"
+#include "clients/hamel/replay.h"
 #include "common/runtime/signals.h"
 
 using namespace hamel;
@@ -44,9 +45,11 @@ class RecordVerbs {
     recover_ = add_log("recover", "copy what is whole of a cut or damaged recording, with a new index");
     recover_->add_option("-o,--output", log_args_.out_path, "new file")->required();
     recover_->add_option("--compression", log_args_.compression, "none, lz4 or zstd")->capture_default_str();
+    add_replay(app);
   }
 
   std::optional<int> run() const {
+    if (replay_->parsed()) return client::replay(replay_args_);
     if (record_->parsed()) return client::record(record_args_);
     if (info_->parsed()) return client::log_info(log_args_);
     if (cat_->parsed()) return client::log_cat(log_args_);
@@ -67,9 +70,25 @@ class RecordVerbs {
     verb.add_option("--until", log_args_.end_s, "up to this time of the run")->type_name("SECONDS");
   }
 
+  void add_replay(CLI::App& app) {
+    replay_ = app.add_subcommand("replay", "feed a recording to a service and compare what comes out with what was recorded");
+    replay_->add_option("file", replay_args_.path, "recording")->required()->type_name("FILE");
+    replay_->add_option("--into", replay_args_.into, "planner or dynamics")
+        ->required()
+        ->check(CLI::IsMember({"planner", "dynamics"}));
+    replay_->add_flag("--check", replay_args_.check, "exit code 1 where anything differs");
+    replay_->add_option("--tolerance", replay_args_.tolerances, "absolute, of one field (torque=1e-9) or of all (*=1e-12); repeat")
+        ->type_name("FIELD=NUMBER")
+        ->allow_extra_args(false);
+    replay_->add_option("--scene", replay_args_.scene_path, "scene to use instead of the recorded one");
+    replay_->add_option("--set", replay_args_.overrides, "override a field of the scene")->type_name("PATH=VALUE")->allow_extra_args(false);
+    replay_->add_flag("--json", replay_args_.json, "one JSON object");
+  }
+
   client::RecordArgs record_args_;
+  client::ReplayArgs replay_args_;
   client::LogArgs log_args_;
-  CLI::App *record_, *log_, *info_, *cat_, *csv_, *recover_;
+  CLI::App *record_, *replay_, *log_, *info_, *cat_, *csv_, *recover_;
 };
 
 }  // namespace
