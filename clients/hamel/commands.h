@@ -12,6 +12,7 @@ struct RunArgs {
   runtime::RunOptions run;
   bool json = false;
   std::string csv_path;
+  std::string record_path, compression = "lz4";
 };
 
 /// All three services in this process.

@@ -2,6 +2,8 @@
 
 #include "clients/hamel/commands.h"
 #include "clients/hamel/plot.h"
+#include "clients/hamel/record.h"
+#include "clients/hamel/replay.h"
 #include "common/runtime/signals.h"
 
 using namespace hamel;
@@ -13,7 +15,81 @@ void add_run_like(CLI::App& app, client::RunArgs& a) {
   app.add_flag("--json", a.json, "one JSON object on stdout instead of the table");
   app.add_option("--csv", a.csv_path, "write every step: t_s, q, qd, tau, end effector, clearance, energy, iterations")
       ->type_name("FILE");
+  app.add_option("--record", a.record_path, "keep every message of the run in this file (MCAP)")->type_name("FILE");
+  app.add_option("--compression", a.compression, "of the recording: none, lz4 or zstd")->capture_default_str();
 }
+
+/// record and log: their options, and what to do when they were asked for.
+class RecordVerbs {
+ public:
+  explicit RecordVerbs(CLI::App& app) {
+    record_ = app.add_subcommand("record", "keep every message of the bus in a file (MCAP) until Ctrl-C");
+    record_->add_option("-o,--output", record_args_.path, "recording")->required()->type_name("FILE");
+    record_->add_option("--compression", record_args_.compression, "none, lz4 or zstd")->capture_default_str();
+    record_->add_option("--duration", record_args_.duration_s, "end after so many seconds")->check(CLI::PositiveNumber);
+    record_->add_option("--scene", record_args_.scene_path, "scene of the run, kept in the recording for replays");
+    record_->add_option("--set", record_args_.overrides, "overrides of the run")->type_name("PATH=VALUE")->allow_extra_args(false);
+    runtime::add_bus_options(*record_, record_args_.bus);
+
+    log_ = app.add_subcommand("log", "look into a recording");
+    log_->require_subcommand(1);
+    info_ = add_log("info", "what it holds, and whether it is whole");
+    info_->add_flag("--json", log_args_.json, "one JSON object");
+    cat_ = add_log("cat", "every message, a line each");
+    cat_->add_flag("--json", log_args_.json, "one JSON object a line");
+    add_part(*cat_);
+    csv_ = add_log("csv", "the messages of one topic as a table");
+    add_part(*csv_);
+    csv_->get_option("--topic")->required();
+    csv_->add_option("-o,--output", log_args_.out_path, "file instead of stdout");
+    recover_ = add_log("recover", "copy what is whole of a cut or damaged recording, with a new index");
+    recover_->add_option("-o,--output", log_args_.out_path, "new file")->required();
+    recover_->add_option("--compression", log_args_.compression, "none, lz4 or zstd")->capture_default_str();
+    add_replay(app);
+  }
+
+  std::optional<int> run() const {
+    if (replay_->parsed()) return client::replay(replay_args_);
+    if (record_->parsed()) return client::record(record_args_);
+    if (info_->parsed()) return client::log_info(log_args_);
+    if (cat_->parsed()) return client::log_cat(log_args_);
+    if (csv_->parsed()) return client::log_csv(log_args_);
+    if (recover_->parsed()) return client::log_recover(log_args_);
+    return {};
+  }
+
+ private:
+  CLI::App* add_log(const char* name, const char* help) {
+    auto* verb = log_->add_subcommand(name, help);
+    verb->add_option("file", log_args_.path, "recording")->required()->type_name("FILE");
+    return verb;
+  }
+  void add_part(CLI::App& verb) {
+    verb.add_option("--topic", log_args_.topic, "one topic: state, command, obstacles, report, ...");
+    verb.add_option("--start", log_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
+    verb.add_option("--until", log_args_.end_s, "up to this time of the run")->type_name("SECONDS");
+  }
+
+  void add_replay(CLI::App& app) {
+    replay_ = app.add_subcommand("replay", "feed a recording to a service and compare what comes out with what was recorded");
+    replay_->add_option("file", replay_args_.path, "recording")->required()->type_name("FILE");
+    replay_->add_option("--into", replay_args_.into, "planner or dynamics")
+        ->required()
+        ->check(CLI::IsMember({"planner", "dynamics"}));
+    replay_->add_flag("--check", replay_args_.check, "exit code 1 where anything differs");
+    replay_->add_option("--tolerance", replay_args_.tolerances, "absolute, of one field (torque=1e-9) or of all (*=1e-12); repeat")
+        ->type_name("FIELD=NUMBER")
+        ->allow_extra_args(false);
+    replay_->add_option("--scene", replay_args_.scene_path, "scene to use instead of the recorded one");
+    replay_->add_option("--set", replay_args_.overrides, "override a field of the scene")->type_name("PATH=VALUE")->allow_extra_args(false);
+    replay_->add_flag("--json", replay_args_.json, "one JSON object");
+  }
+
+  client::RecordArgs record_args_;
+  client::ReplayArgs replay_args_;
+  client::LogArgs log_args_;
+  CLI::App *record_, *replay_, *log_, *info_, *cat_, *csv_, *recover_;
+};
 
 }  // namespace
 
@@ -63,7 +139,10 @@ int main(int argc, char** argv) {
   plot->add_option("-o,--output", plot_args.out_path, "picture, .svg or .png")->required()->type_name("FILE");
   plot->add_option("--set", plot_args.overrides, "overrides the run was made with")->type_name("PATH=VALUE")->allow_extra_args(false);
 
+  RecordVerbs recordings(app);
+
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
+  if (const auto code = recordings.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (run->parsed()) return client::run(run_args);
   if (up->parsed()) return client::up(up_args);

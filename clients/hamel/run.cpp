@@ -2,6 +2,7 @@
 
 #include "clients/hamel/commands.h"
 #include "clients/hamel/print.h"
+#include "clients/hamel/recorder.h"
 #include "common/runtime/log.h"
 #include "services/dynamics/service.h"
 #include "services/perception/service.h"
@@ -41,6 +42,8 @@ int run(const RunArgs& args) {
     if (!w) return runtime::complain("hamel run", {w.error()});
     csv = std::move(w).value();
   }
+  auto recorder = open_recorder(n, args, s, pace);  // before the services: nothing of them is missed
+  if (!recorder) return runtime::complain("hamel run", {recorder.error()});
   auto arm = dynamics::DynamicsService::make(n, s, {.pace = pace, .state_dir = args.run.state_dir});
   if (!arm) return runtime::complain("hamel run", {arm.error()});
   auto perception = perception::PerceptionService::make(n, s);
@@ -53,8 +56,11 @@ int run(const RunArgs& args) {
   std::vector<runtime::Service*> services{arm.value().get()};
   if (s.steered) services.insert(services.end(), {perception.value().get(), planner.value().get()});
   services.push_back(&monitor);
+  if (recorder.value()) services.push_back(recorder.value().get());
   const bool ended = runtime::run(n, services, monitor, stop);
   monitor.poll(runtime::Clock::now());
+  if (recorder.value() && !args.json)
+    fmt::print(stderr, "{}: {}\n", args.record_path, recorder.value()->report());
   return conclude(s, monitor, !ended, args, scene::to_string(pace), bus::to_string(n.options().vendor));
 }
 

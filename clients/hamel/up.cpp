@@ -6,6 +6,7 @@
 
 #include "clients/hamel/commands.h"
 #include "clients/hamel/print.h"
+#include "clients/hamel/recorder.h"
 #include "clients/hamel/supervisor.h"
 #include "common/runtime/log.h"
 
@@ -100,18 +101,23 @@ int up(const RunArgs& args) {
     return runtime::complain("hamel up", {{state_dir, "cannot make the folder: " + e.message()}});
   }
 
+  auto recorder = open_recorder(n, args, s, pace);
+  if (!recorder) return runtime::complain("hamel up", {recorder.error()});
   Monitor monitor(n, s, pace, std::move(csv), !args.json);
   Supervisor supervisor;
   if (s.steered)
     for (const char* name : {"perception", "planner"}) supervisor.add(name, command(name, args, s, pace, state_dir));
   supervisor.add("dynamics", command("dynamics", args, s, pace, state_dir));
   Children children(supervisor, monitor);
-  runtime::Service* const services[] = {&children, &monitor};
+  std::vector<runtime::Service*> services{&children, &monitor};
+  if (recorder.value()) services.push_back(recorder.value().get());
   const bool ended = runtime::run(n, services, children, stop);
   const Supervisor::Child* failed = supervisor.failed();
   const int failed_code = failed ? failed->exit_code : 0;
   supervisor.end();
 
+  if (recorder.value() && !args.json)
+    fmt::print(stderr, "{}: {}\n", args.record_path, recorder.value()->report());
   const Outcome o = monitor.outcome(!ended);
   if (failed && !monitor.finished()) {
     spdlog::error("{} cannot run; ending", failed->name);

@@ -7,6 +7,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <variant>
 
 #include "common/bus/bus.h"
@@ -54,5 +55,7 @@ HAMEL_WIRE_TYPE(RunSummary)
 
 /// SHA-256 of idl/hamel_v1.idl as this program was built with it, the first 16 hexadecimal digits.
 const char* idl_hash();
+/// That file's text.
+std::string_view idl_text();
 
 }  // namespace hamel::wire

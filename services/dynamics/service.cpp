@@ -69,7 +69,7 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
       config_(config),
       arm_(scene_),
       fingerprint_(fingerprint(scene)),
-      incarnation_(fresh_incarnation(config.pace)),
+      incarnation_(config.incarnation != 0 ? config.incarnation : fresh_incarnation(config.pace)),
       state_out_(node),
       clock_out_(node),
       summary_out_(node),

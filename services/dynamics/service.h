@@ -19,6 +19,7 @@ struct ServiceConfig {
   bool endless = false;                            ///< ignore the scene's duration: run until told to end
   std::string state_dir = {};                           ///< checkpoint folder; empty: none
   std::chrono::milliseconds patience{10000};       ///< lockstep: how long to wait for one command
+  std::uint64_t incarnation = 0;                   ///< of a replayed run; 0: a new one
 };
 
 /// How the run ended.

@@ -28,6 +28,7 @@ SHELL = {
 }
 for service in ("dynamics", "planner", "perception"):
     SHELL[f"services/{service}"] = BELOW_CORES | set(SHELL) | {"common/runtime", f"services/{service}/core"}
+SHELL["common/record"] = {"common/base"}
 SHELL["clients/hamel"] = set(CORE) | set(SHELL)
 ROOMS = CORE | SHELL
 
@@ -39,6 +40,7 @@ ONLY_IN = {
     r"^(fastdds|fastrtps|fastcdr|dds)/": ("common/bus", "common/wire"),
     r"^hamel_v1": ("common/wire",),
     r"^(google/protobuf|urdf_|tinyxml2)": ("common/files",),
+    r"^(lz4|zstd|zlib)": ("common/record", "common/runtime"),
     r"^spdlog/": ("common/runtime", "clients/hamel"),
 }
 

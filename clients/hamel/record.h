@@ -1,0 +1,31 @@
+#pragma once
+/// The verbs about recordings.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/runtime/options.h"
+
+namespace hamel::client {
+
+struct RecordArgs {
+  runtime::BusOptions bus;
+  std::string path, compression = "lz4", scene_path;
+  std::vector<std::string> overrides;
+  double duration_s = -1;
+};
+/// Records the bus until told to end.
+int record(const RecordArgs& args);
+
+struct LogArgs {
+  std::string path, out_path, topic, compression = "lz4";
+  double begin_s = 0, end_s = -1;  ///< log time; end < 0: to the end
+  bool json = false;
+};
+int log_info(const LogArgs& args);
+int log_cat(const LogArgs& args);
+int log_csv(const LogArgs& args);
+int log_recover(const LogArgs& args);
+
+}  // namespace hamel::client
