@@ -1,6 +1,7 @@
 /// hamel: the command line.
 
 #include "clients/hamel/commands.h"
+#include "clients/hamel/figures.h"
 #include "clients/hamel/plot.h"
 #include "clients/hamel/trade.h"
 #include "common/runtime/signals.h"
@@ -42,6 +43,19 @@ CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
   trade->add_option("--plot", a.plot_path, "draw cost against error, .svg or .png (needs gnuplot)")
       ->type_name("FILE");
   return trade;
+}
+
+CLI::App* add_figures(CLI::App& app, client::FiguresArgs& a) {
+  auto* figures = app.add_subcommand(
+      "figures", "draw figures 3, 4 and 5 of the paper from a free motion (needs gnuplot)");
+  figures->add_option("scene", a.scene_path, "scene file; the paper's is three_link_swing.textproto")
+      ->required()
+      ->type_name("SCENE");
+  figures->add_option("--set", a.overrides, "override a field of the scene; repeat")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  figures->add_option("-o,--output", a.folder, "folder for csv, svg and png")->required()->type_name("DIR");
+  return figures;
 }
 
 }  // namespace
@@ -100,9 +114,12 @@ int main(int argc, char** argv) {
 
   client::TradeArgs trade_args;
   const auto* trade = add_trade(app, trade_args);
+  client::FiguresArgs figures_args;
+  const auto* figures = add_figures(app, figures_args);
 
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   if (plot->parsed()) return client::plot(plot_args);
+  if (figures->parsed()) return client::figures(figures_args);
   if (trade->parsed()) return client::trade(trade_args);
   if (run->parsed()) return client::run(run_args);
   if (up->parsed()) return client::up(up_args);

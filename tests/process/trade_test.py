@@ -62,6 +62,19 @@ class Trade(unittest.TestCase):
             p.send_signal(signal.SIGINT)
             self.assertEqual(p.wait(DEADLINE_S), 130)
 
+class Figures(unittest.TestCase):
+    def test_figures_of_the_paper_are_drawn(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, out, err = hamel("figures", SWING, "-o", folder)
+            self.assertEqual(code, 0, err)
+            self.assertEqual({p.name for p in pathlib.Path(folder).iterdir()},
+                             {f"figure{i}.{e}" for i in (3, 4, 5) for e in ("csv", "svg", "png")})
+            with open(pathlib.Path(folder, "figure5.csv"), newline="") as rows:
+                steps = list(csv.DictReader(rows))
+            self.assertEqual(len(steps), 10000)
+            self.assertLessEqual(max(int(r["iterations"]) for r in steps), 4)  # as the paper says
+            self.assertLess(max(float(r["residual_Nm"]) for r in steps), 1e-8)
+
 
 if __name__ == "__main__":
     main()
