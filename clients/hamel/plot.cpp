@@ -1,8 +1,6 @@
 #include "clients/hamel/plot.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "clients/hamel/gnuplot.h"
 #include "common/rbd/rbd.h"
 #include "common/runtime/options.h"
 #include "services/perception/core/source.h"
@@ -42,16 +41,22 @@ Result<std::vector<Row>, Problem> read_rows(const std::string& path, int n) {
   std::map<std::string, std::size_t> column;
   std::istringstream header(line);
   for (std::string name; std::getline(header, name, ',');) column.emplace(name, column.size());
-  const auto at = [&](const std::string& name) { return column.contains(name) ? static_cast<long>(column[name]) : -1; };
-  for (const std::string& name : {std::string("t_s"), fmt::format("q{}", n), std::string("ee_x_m"), std::string("clearance_m")})
-    if (at(name) < 0) return Problem{path + ":1", "has no column " + name + ": written by --csv of this scene?"};
+  const auto at = [&](const std::string& name) {
+    return column.contains(name) ? static_cast<long>(column[name]) : -1;
+  };
+  for (const std::string& name :
+       {std::string("t_s"), fmt::format("q{}", n), std::string("ee_x_m"), std::string("clearance_m")})
+    if (at(name) < 0)
+      return Problem{path + ":1", "has no column " + name + ": written by --csv of this scene?"};
   std::vector<Row> rows;
   std::vector<double> v;
   for (int number = 2; std::getline(in, line); ++number) {
     v.clear();
     std::istringstream cells(line);
     for (std::string cell; std::getline(cells, cell, ',');) v.push_back(std::strtod(cell.c_str(), nullptr));
-    if (v.size() != column.size()) return Problem{fmt::format("{}:{}", path, number), fmt::format("has {} cells, the header {}", v.size(), column.size())};
+    if (v.size() != column.size())
+      return Problem{fmt::format("{}:{}", path, number),
+                     fmt::format("has {} cells, the header {}", v.size(), column.size())};
     Row r;
     r.t_s = v[column["t_s"]];
     r.clearance_m = v[column["clearance_m"]];
@@ -77,18 +82,24 @@ std::vector<Eigen::Vector3d> outline_points(const geometry::Obstacle& o) {
       }
   };
   switch (o.shape.kind) {
-    case geometry::ShapeKind::sphere: ball(d[0], 0); break;
-    case geometry::ShapeKind::capsule: ball(d[0], d[1] / 2), ball(d[0], -d[1] / 2); break;
+    case geometry::ShapeKind::sphere:
+      ball(d[0], 0);
+      break;
+    case geometry::ShapeKind::capsule:
+      ball(d[0], d[1] / 2), ball(d[0], -d[1] / 2);
+      break;
     case geometry::ShapeKind::cylinder:
       for (int i = 0; i < 24; ++i)
-        for (const double z : {-d[1] / 2, d[1] / 2}) add(d[0] * std::cos(i * M_PI / 12), d[0] * std::sin(i * M_PI / 12), z);
+        for (const double z : {-d[1] / 2, d[1] / 2})
+          add(d[0] * std::cos(i * M_PI / 12), d[0] * std::sin(i * M_PI / 12), z);
       break;
     case geometry::ShapeKind::box:
       for (const double x : {-0.5, 0.5})
         for (const double y : {-0.5, 0.5})
           for (const double z : {-0.5, 0.5}) add(x * d[0], y * d[1], z * d[2]);
       break;
-    case geometry::ShapeKind::half_space: break;  // fills the picture: not drawn
+    case geometry::ShapeKind::half_space:
+      break;  // fills the picture: not drawn
   }
   return points;
 }
@@ -114,19 +125,8 @@ std::vector<Point> hull(std::vector<Point> p) {
   return h;
 }
 
-class Script {
- public:
-  template <class... A>
-  void add(fmt::format_string<A...> f, A&&... a) {
-    fmt::format_to(std::back_inserter(text_), f, std::forward<A>(a)...);
-  }
-  std::string str() const { return fmt::to_string(text_); }
-
- private:
-  fmt::memory_buffer text_;
-};
-
-void add_arms(Script& s, const scene::Scene& scene, const std::vector<Row>& rows, const View& v, const std::string& block) {
+void add_arms(Script& s, const scene::Scene& scene, const std::vector<Row>& rows, const View& v,
+              const std::string& block) {
   rbd::Workspace ws(scene.robot.chain);
   s.add("${} << EOD\n", block);
   for (int k = 0; k <= kSnapshots; ++k) {
@@ -142,7 +142,8 @@ void add_arms(Script& s, const scene::Scene& scene, const std::vector<Row>& rows
   s.add("EOD\n");
 }
 
-void add_obstacles(Script& s, const perception::Source& source, double end_s, double grow_m, const View& v, const std::string& block) {
+void add_obstacles(Script& s, const perception::Source& source, double end_s, double grow_m, const View& v,
+                   const std::string& block) {
   std::vector<geometry::Obstacle> at;
   s.add("${} << EOD\n", block);
   const int times = source.is_static() ? 1 : 5;
@@ -163,23 +164,27 @@ void add_obstacles(Script& s, const perception::Source& source, double end_s, do
 }
 
 /// gnuplot draws nothing of a block without points, but complains: an empty block is left out.
-std::string script(const PlotArgs& args, const scene::Scene& scene, const std::vector<Row>& rows, const perception::Source& source) {
-  const bool flat = std::all_of(rows.begin(), rows.end(), [&](const Row& r) { return std::abs(r.tip_m.z() - rows[0].tip_m.z()) < 1e-9; });
+std::string script(const PlotArgs& args, const scene::Scene& scene, const std::vector<Row>& rows,
+                   const perception::Source& source) {
+  const bool flat = std::all_of(rows.begin(), rows.end(), [&](const Row& r) {
+    return std::abs(r.tip_m.z() - rows[0].tip_m.z()) < 1e-9;
+  });
   std::vector<View> views{{0, 1, "x", "y"}};
   if (!flat) views.push_back({0, 2, "x", "z"});
-  const bool png = args.out_path.ends_with(".png");
   std::vector<geometry::Obstacle> first;
   source.at(0, first);
 
   Script s;
-  s.add("set terminal {} noenhanced size {},540 {}\nset output '{}'\n", png ? "pngcairo" : "svg", 480 * (views.size() + 1),
-        png ? "" : "background 'white'", args.out_path);
+  s.add("{}", terminal(args.out_path, 480 * static_cast<int>(views.size() + 1), 540));
   s.add("$path << EOD\n");
   const std::size_t stride = std::max<std::size_t>(1, rows.size() / kPathPoints);
   for (std::size_t i = 0; i < rows.size(); i += stride) {
     const Row& r = rows[i];
-    const double error = scene.goal && scene.goal->kind != scene::GoalKind::joints ? (r.tip_m - scene.goal->X_WG.p).norm() : NAN;
-    s.add("{} {} {} {} {} {} {}\n", r.tip_m.x(), r.tip_m.y(), r.tip_m.z(), r.t_s, r.clearance_m, error, r.energy_J);
+    const double error = scene.goal && scene.goal->kind != scene::GoalKind::joints
+                             ? (r.tip_m - scene.goal->X_WG.p).norm()
+                             : NAN;
+    s.add("{} {} {} {} {} {} {}\n", r.tip_m.x(), r.tip_m.y(), r.tip_m.z(), r.t_s, r.clearance_m, error,
+          r.energy_J);
   }
   s.add("EOD\n");
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -193,11 +198,15 @@ std::string script(const PlotArgs& args, const scene::Scene& scene, const std::v
     const View& v = views[i];
     s.add("set size ratio -1\nset xlabel '{} [m]'\nset ylabel '{} [m]'\nplot ", v.label_across, v.label_up);
     if (!first.empty())
-      s.add("$reach{} with lines dt 3 lc rgb '#999999' title 'influence', $solid{} with filledcurves fc rgb '#cc6644' title 'obstacle', ", i, i);
+      s.add(
+          "$reach{} with lines dt 3 lc rgb '#999999' title 'influence', $solid{} with filledcurves fc rgb "
+          "'#cc6644' title 'obstacle', ",
+          i, i);
     s.add("$arms{} with linespoints pt 7 ps 0.3 lc rgb '#8899bb' title 'arm', ", i);
     s.add("$path using {}:{} with lines lw 2 lc rgb '#114488' title 'end effector'", v.across + 1, v.up + 1);
     if (scene.goal && scene.goal->kind != scene::GoalKind::joints)
-      s.add(", '-' with points pt 2 ps 1.5 lw 2 lc rgb '#228833' title 'target'\n{} {}\ne", scene.goal->X_WG.p[v.across], scene.goal->X_WG.p[v.up]);
+      s.add(", '-' with points pt 2 ps 1.5 lw 2 lc rgb '#228833' title 'target'\n{} {}\ne",
+            scene.goal->X_WG.p[v.across], scene.goal->X_WG.p[v.up]);
     s.add("\n");
   }
   s.add("set size noratio\nset xlabel 't [s]'\n");
@@ -218,19 +227,13 @@ int plot(const PlotArgs& args) {
   o.overrides = args.overrides;
   const auto scene = runtime::load(o);
   if (!scene) return runtime::complain("hamel plot", scene.error());
-  if (!args.out_path.ends_with(".svg") && !args.out_path.ends_with(".png"))
-    return runtime::complain("hamel plot", {{"-o " + args.out_path, "must end in .svg or .png"}});
+  if (const auto p = check_picture_name(args.out_path)) return runtime::complain("hamel plot", {*p});
   const auto rows = read_rows(args.csv_path, scene.value().robot.chain.n());
   if (!rows) return runtime::complain("hamel plot", {rows.error()});
   const auto source = perception::Source::make(scene.value().perception);
   if (!source) return runtime::complain("hamel plot", source.error());
-  std::FILE* gnuplot = popen("gnuplot", "w");
-  if (!gnuplot) return runtime::complain("hamel plot", {{"gnuplot", "cannot be started"}});
   const std::string text = script(args, scene.value(), rows.value(), source.value());
-  std::fwrite(text.data(), 1, text.size(), gnuplot);
-  const int status = pclose(gnuplot);
-  if (status != 0 || access(args.out_path.c_str(), R_OK) != 0)
-    return runtime::complain("hamel plot", {{args.out_path, status == 127 << 8 ? "gnuplot is not installed" : "gnuplot could not draw it"}});
+  if (const auto p = draw(text, args.out_path)) return runtime::complain("hamel plot", {*p});
   return runtime::kDone;
 }
 

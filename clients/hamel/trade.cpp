@@ -1,0 +1,212 @@
+#include "clients/hamel/trade.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+
+#include "clients/hamel/gnuplot.h"
+#include "clients/hamel/trade_choice.h"
+#include "common/runtime/log.h"
+#include "common/runtime/options.h"
+#include "common/runtime/signals.h"
+
+namespace hamel::client {
+
+namespace {
+
+using trade::Measured;
+
+/// One line on a terminal's stderr, overwritten.
+class Progress {
+ public:
+  void say(const std::string& what) {
+    if (on_) fmt::print(stderr, "\r\033[K{}", what), std::fflush(stderr);
+  }
+  ~Progress() { say(""); }
+
+ private:
+  const bool on_ = isatty(STDERR_FILENO) == 1;
+};
+
+std::string small(double v) { return std::isfinite(v) ? fmt::format("{:.1e}", v) : "-"; }
+
+void print_reference(const scene::Scene& s, const trade::Motion& m, const trade::Reference& r) {
+  fmt::print("{}: free motion of {} ({} joints) over {:.6g} s{}\n", s.name, s.robot.name, m.chain.n(),
+             m.horizon_s, s.steered ? ", planner and compensation of gravity off" : "");
+  if (r.valid_s <= 0)
+    fmt::print("reference: none: two runs of gauss-8 disagree within {:.6g} s; joint errors mean nothing\n",
+               m.horizon_s / trade::kSamples);
+  else
+    fmt::print(
+        "reference: gauss-8, dt {:.6g} s; halving the step moves no joint by more than {:.1e} up to {:.6g} "
+        "s\n",
+        r.dt_s, r.uncertainty, r.valid_s);
+  if (r.valid_s > 0 && r.valid_s < m.horizon_s * (1 - 1e-9))
+    fmt::print("           beyond that nothing converges (chaotic motion): joint errors count up to there\n");
+}
+
+void print_table(const std::vector<Measured>& all) {
+  fmt::print("\n  {:<26}{:>10} {:>10} {:>10} {:>10} {:>12} {:>10} {:>12} {:>8}\n", "method", "dt [s]",
+             "joints", "energy", "momentum", "time [us/s]", "evals/s", "iterations", "divided");
+  for (const Measured& m : all) {
+    const std::string name = trade::label(m.options);
+    if (!m.finished) {
+      fmt::print("  {:<26}{:>10.4g} refused a step at t = {:.4g} s\n", name, m.options.dt_s, m.refused_s);
+      continue;
+    }
+    fmt::print("{} {:<26}{:>10.4g} {:>10} {:>10} {:>10} {:>12.1f} {:>10.0f} {:>7.1f}/{:<4} {:>8}\n",
+               m.on_front ? '*' : ' ', name, m.options.dt_s, small(m.joint_error), small(m.energy_error),
+               small(m.momentum_error), 1e6 * m.seconds_per_s, m.evaluations_per_s, m.iterations_mean,
+               m.iterations_max, m.substepped > 0 ? std::to_string(m.substepped) : "");
+  }
+  fmt::print(
+      "\n* nothing measured is both cheaper and more accurate.  Errors: largest |q - reference| [rad or m]; "
+      "|E - E0 - work| and momentum\n  about joint 1 relative to the largest in play.  Time: wall time of a "
+      "simulated second.\n");
+}
+
+std::optional<Problem> write_csv(const std::string& path, const std::vector<Measured>& all) {
+  std::ofstream out(path);
+  out << "method,tier,root,stages,dt_s,tolerance_Nm,tolerance_rel,finished,joint_error,energy_error,momentum_"
+         "error,"
+         "time_s_per_s,evaluations_per_s,iterations_mean,iterations_max,divided_steps,front\n";
+  for (const Measured& m : all)
+    out << fmt::format("{},{},{},{},{},{},{},{:d},{},{},{},{},{},{},{},{},{:d}\n", trade::label(m.options),
+                       scene::to_string(m.options.tier), scene::to_string(m.options.root), m.options.stages,
+                       m.options.dt_s, m.options.tolerance_Nm, m.options.tolerance_rel, m.finished,
+                       m.joint_error, m.energy_error, m.momentum_error, m.seconds_per_s, m.evaluations_per_s,
+                       m.iterations_mean, m.iterations_max, m.substepped, m.on_front);
+  out.flush();
+  if (!out) return Problem{path, "cannot be written"};
+  return std::nullopt;
+}
+
+/// Joint error and energy error against cost, a line for each method.
+std::optional<Problem> draw_all(const std::string& path, const std::string& title,
+                                const std::vector<Measured>& all, trade::Cost by) {
+  std::vector<std::pair<std::string, std::vector<const Measured*>>> groups;
+  for (const Measured& m : all) {
+    if (!m.finished || m.options.tolerance_Nm == 1e-6) continue;
+    const std::string name = m.options.tier == scene::Tier::dopri8 ? "dopri8" : trade::label(m.options);
+    const auto at =
+        std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == name; });
+    (at == groups.end() ? groups.emplace_back(name, std::vector<const Measured*>{}) : *at)
+        .second.push_back(&m);
+  }
+  const double scale = by == trade::Cost::time ? 1e6 : 1;
+  Script s;
+  s.add("{}", terminal(path, 1200, 560));
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    s.add("$g{} << EOD\n", i);
+    for (const Measured* m : groups[i].second)
+      s.add("{} {} {}\n", scale * trade::cost(*m, by), m->joint_error, m->energy_error + 1e-17);
+    s.add("EOD\n");
+  }
+  s.add("$front << EOD\n");
+  for (const Measured& m : all)
+    if (m.on_front) s.add("{} {}\n", scale * trade::cost(m, by), m.joint_error);
+  s.add(
+      "EOD\nset multiplot layout 1,2 title \"{}\" noenhanced\nset logscale xy\nset format '10^{{%T}}'\nset "
+      "grid\nset xlabel '{}'\n",
+      title,
+      by == trade::Cost::time ? "time of a simulated second [us]" : "evaluations of a simulated second");
+  for (const int column : {2, 3}) {
+    s.add("set key {}\nset ylabel '{}'\nplot ", column == 2 ? "off" : "outside right noenhanced",
+          column == 2 ? "joint error [rad]" : "energy error / scale");
+    for (std::size_t i = 0; i < groups.size(); ++i)
+      s.add("$g{} using 1:{} with linespoints lw 1.5 lt {} title '{}'{}", i, column, i + 1, groups[i].first,
+            i + 1 < groups.size() ? ", " : "");
+    if (column == 2) s.add(", $front using 1:2 with points pt 6 ps 1.6 lc rgb 'black' notitle");
+    s.add("\n");
+  }
+  s.add("unset multiplot\n");
+  return draw(s.str(), path);
+}
+
+int print_recommendation(const TradeArgs& args, const trade::Motion& m, const std::vector<Measured>& all,
+                         const trade::Reference& r, trade::Cost by) {
+  const auto best = trade::recommend(all, r, m.horizon_s, args.accuracy, by);
+  if (!best) {
+    fmt::print("\nNothing measured keeps every joint within {:g} over {:g} s without dividing steps",
+               args.accuracy, m.horizon_s);
+    fmt::print(
+        "{}.\n",
+        r.valid_s < m.horizon_s * (1 - 1e-9)
+            ? fmt::format(": no method has an answer after {:.4g} s, where the reference ends", r.valid_s)
+            : "");
+    return runtime::kFailed;
+  }
+  const dynamics::Options& o = best->options;
+  fmt::print("\nTo keep every joint within {:g} over {:g} s: {} with dt {:.6g} s\n", args.accuracy,
+             m.horizon_s, trade::label(o), o.dt_s);
+  fmt::print(
+      "  measured: joints {:.1e}, energy {:.1e}, {:.1f} us and {:.0f} evaluations a simulated second\n",
+      best->joint_error, best->energy_error, 1e6 * best->seconds_per_s, best->evaluations_per_s);
+  fmt::print("  --set dynamics.tier={} --set dynamics.dt_s={}", scene::to_string(o.tier), o.dt_s);
+  if (o.tier == scene::Tier::gauss) fmt::print(" --set dynamics.stages={}", o.stages);
+  if (o.tier == scene::Tier::dopri8) fmt::print(" --set dynamics.tolerance_rel={:g}", o.tolerance_rel);
+  fmt::print(" --set dynamics.root={} --set dynamics.tolerance_Nm={:g}\n", scene::to_string(o.root),
+             o.tolerance_Nm);
+  return runtime::kDone;
+}
+
+}  // namespace
+
+int trade(const TradeArgs& args) {
+  runtime::StopSignal stop;
+  runtime::start_log("hamel", false);
+  runtime::RunOptions o;
+  o.scene_path = args.scene_path;
+  o.overrides = args.overrides;
+  const auto loaded = runtime::load(o);
+  if (!loaded) return runtime::complain("hamel trade", loaded.error());
+  const scene::Scene& s = loaded.value();
+  if (!args.plot_path.empty())
+    if (const auto p = check_picture_name(args.plot_path)) return runtime::complain("hamel trade", {*p});
+  const trade::Cost by = args.by == "time" ? trade::Cost::time : trade::Cost::evaluations;
+  const trade::Motion motion{.chain = s.robot.chain,
+                             .q0 = s.q0,
+                             .qd0 = s.qd0,
+                             .horizon_s = args.horizon_s > 0 ? args.horizon_s : s.duration_s,
+                             .tick_s = args.tick_s > 0 ? args.tick_s : scene::kInf,
+                             .base = s.dynamics};
+  const trade::Watch watch{
+      [] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+      },
+      [&stop] { return stop.requested(); }};
+
+  std::vector<Measured> all;
+  trade::Reference reference;
+  {
+    Progress progress;
+    progress.say("converging the reference");
+    reference = trade::converge(motion, watch);
+    const auto candidates = trade::candidates(motion, args.quick);
+    for (std::size_t i = 0; i < candidates.size() && !stop.requested(); ++i) {
+      progress.say(fmt::format("{}/{} {} dt {:.4g} s", i + 1, candidates.size(), trade::label(candidates[i]),
+                               candidates[i].dt_s));
+      all.push_back(trade::measure(motion, candidates[i], reference, watch));
+    }
+  }
+  if (stop.requested()) return runtime::kInterrupted;
+  trade::mark_front(all, reference, by);
+  print_reference(s, motion, reference);
+  print_table(all);
+  const int code =
+      args.accuracy > 0 ? print_recommendation(args, motion, all, reference, by) : runtime::kDone;
+  if (!args.csv_path.empty())
+    if (const auto p = write_csv(args.csv_path, all)) return runtime::complain("hamel trade", {*p});
+  if (!args.plot_path.empty())
+    if (const auto p = draw_all(args.plot_path, s.name, all, by))
+      return runtime::complain("hamel trade", {*p});
+  return code;
+}
+
+}  // namespace hamel::client

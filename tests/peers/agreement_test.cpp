@@ -1,0 +1,101 @@
+// Our dynamics against four other libraries, each told the same numbers through its own API.
+// Tolerance: 1e-10 of the norm; where M is inverted, times its condition.
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "common/files/urdf.h"
+#include "common/rbd/rbd.h"
+#include "tests/peers/peer.h"
+#include "tests/support/chains.h"
+#include "tests/support/data.h"
+
+namespace hamel::peers {
+namespace {
+
+constexpr double kTolerance = 1e-10;
+constexpr unsigned kChains = 200;
+
+/// What the peer can be told of `spec`: no damping, and no rotors where it knows none.
+model::Chain known_to(const Peer& peer, model::ChainSpec spec) {
+  for (model::Joint& joint : spec.joints)
+    if (!peer.has_armature()) joint.armature = 0;
+  return test::checked(std::move(spec));
+}
+
+double condition(const MatrixXd& M) {
+  const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(M).eigenvalues();
+  return values[values.size() - 1] / values[0];
+}
+
+/// One state: all four functions.
+void compare(Peer& peer, const model::Chain& chain, test::Random& rng) {
+  const int n = chain.n();
+  const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 2), qdd = rng.vector(n, 5), tau = rng.vector(n, 10);
+  const VectorXd zero = VectorXd::Zero(n);
+  rbd::Workspace ws(chain);
+  MatrixXd M(n, n), M_peer;
+  rbd::positions(chain, q, ws);
+  rbd::mass_matrix(chain, ws, M);
+  peer.mass_matrix(q, M_peer);
+  EXPECT_LE((M - M_peer).norm(), kTolerance * M.norm());
+
+  VectorXd ours(n), theirs(n);
+  rbd::gravity_torque(chain, ws, ours);
+  peer.inverse_dynamics(q, zero, zero, theirs);
+  EXPECT_LE((ours - theirs).norm(), kTolerance * (theirs.norm() + rbd::energy_scale(chain)));
+
+  rbd::inverse_dynamics(chain, q, qd, qdd, ws, ours);
+  peer.inverse_dynamics(q, qd, qdd, theirs);
+  EXPECT_LE((ours - theirs).norm(), kTolerance * theirs.norm());
+
+  VectorXd damping(n);
+  for (int i = 0; i < n; ++i) damping[i] = chain.joint(i).damping;
+  rbd::forward_dynamics(chain, q, qd, tau, ws, ours);
+  peer.forward_dynamics(q, qd, tau - damping.cwiseProduct(qd), theirs);
+  EXPECT_LE((ours - theirs).norm(), kTolerance * condition(M) * theirs.norm());
+}
+
+class Peers : public testing::TestWithParam<Maker> {
+ protected:
+  void compare_at(const model::ChainSpec& spec, unsigned seed, int states) {
+    const auto bare = GetParam().make(test::checked(spec));
+    const model::Chain chain = known_to(*bare, spec);
+    const auto peer = GetParam().make(chain);
+    test::Random rng(seed);
+    for (int k = 0; k < states; ++k) compare(*peer, chain, rng);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Agreement, Peers, testing::ValuesIn(makers()),
+                         [](const auto& peer) { return peer.param.name; });
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Peers);
+
+TEST_P(Peers, AgreeOnRandomChains) {
+  for (unsigned seed = 0; seed < kChains; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    test::Random rng(seed);
+    const model::ChainSpec spec = test::random_spec(rng, 1 + static_cast<int>(seed % 10), {.damping = 0.3});
+    compare_at(spec, seed + 1000, 3);
+    if (HasFailure()) return;
+  }
+}
+
+TEST_P(Peers, AgreeOnTheExamplesOfThePaper) {
+  compare_at(test::paper_5_1().spec(), 1, 20);
+  compare_at(test::paper_5_2().spec(), 2, 20);
+}
+
+TEST_P(Peers, AgreeOnRobotsOfTheWorld) {
+  HAMEL_NEEDS_DATA("urdf");
+  for (const auto& entry : std::filesystem::directory_iterator(test::data_folder() / "urdf")) {
+    if (entry.path().extension() != ".urdf") continue;
+    SCOPED_TRACE(entry.path().filename().string());
+    const auto robot = files::load_urdf(entry.path().string());
+    ASSERT_TRUE(robot) << to_string(robot.error().front());
+    compare_at(robot.value().chain.spec(), 7, 20);
+  }
+}
+
+}  // namespace
+}  // namespace hamel::peers

@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""`hamel trade` as a user runs it."""
+
+import csv
+import pathlib
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+from programs import BIN, DEADLINE_S, hamel, main, scene
+
+SWING = scene("three_link_swing")
+
+
+def blocks_interrupts(pid):
+    """True once the program takes Ctrl-C itself."""
+    status = pathlib.Path(f"/proc/{pid}/status").read_text()
+    return int(status.split("SigBlk:")[1].split()[0], 16) >> (signal.SIGINT - 1) & 1
+
+
+class Trade(unittest.TestCase):
+    def test_recommends_with_evidence_and_writes_what_it_measured(self):
+        with tempfile.TemporaryDirectory() as folder:
+            table, picture = pathlib.Path(folder, "t.csv"), pathlib.Path(folder, "t.svg")
+            code, out, err = hamel("trade", SWING, "--quick", "--horizon", "10", "--accuracy", "1e-4", "--csv", table, "--plot", picture)
+            self.assertEqual(code, 0, err)
+            self.assertIn("To keep every joint within 0.0001 over 10 s", out)
+            self.assertIn("--set dynamics.tier=", out)
+            self.assertEqual(err, "")  # progress is for terminals
+            with open(table, newline="") as rows:
+                measured = list(csv.DictReader(rows))
+            self.assertLessEqual({"midpoint", "gauss", "rk4", "dopri8", "hamel", "semi_implicit_euler"}, {r["tier"] for r in measured})
+            self.assertTrue(any(r["front"] == "1" for r in measured))
+            self.assertIn("<svg", picture.read_text())
+
+    def test_says_when_nothing_measured_meets_it(self):
+        code, out, _ = hamel("trade", SWING, "--quick", "--horizon", "5", "--accuracy", "1e-16")
+        self.assertEqual(code, 1)
+        self.assertIn("Nothing measured", out)
+
+    def test_the_same_twice_but_for_times(self):
+        def rows():
+            with tempfile.NamedTemporaryFile(suffix=".csv") as f:
+                self.assertEqual(hamel("trade", SWING, "--quick", "--horizon", "5", "--by", "evaluations", "--csv", f.name)[0], 0)
+                with open(f.name, newline="") as table:
+                    return [{k: v for k, v in r.items() if k != "time_s_per_s"} for r in csv.DictReader(table)]
+        self.assertEqual(rows(), rows())
+
+    def test_bad_input_is_two(self):
+        self.assertEqual(hamel("trade", SWING, "--plot", "x.pdf")[0], 2)
+        self.assertEqual(hamel("trade", SWING, "--by", "luck")[0], 2)
+        self.assertEqual(hamel("trade", SWING, "--quick", "--horizon", "1", "--csv", "/dev/full")[0], 2)
+
+    def test_ctrl_c_is_130(self):
+        p = subprocess.Popen([BIN / "hamel", "trade", SWING, "--horizon", "100000"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        with p.stdout, p.stderr:
+            end = time.monotonic() + DEADLINE_S
+            while not blocks_interrupts(p.pid) and time.monotonic() < end:
+                pass
+            p.send_signal(signal.SIGINT)
+            self.assertEqual(p.wait(DEADLINE_S), 130)
+
+class Figures(unittest.TestCase):
+    def test_figures_of_the_paper_are_drawn(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, out, err = hamel("figures", SWING, "-o", folder)
+            self.assertEqual(code, 0, err)
+            self.assertEqual({p.name for p in pathlib.Path(folder).iterdir()},
+                             {f"figure{i}.{e}" for i in (3, 4, 5) for e in ("csv", "svg", "png")})
+            with open(pathlib.Path(folder, "figure5.csv"), newline="") as rows:
+                steps = list(csv.DictReader(rows))
+            self.assertEqual(len(steps), 10000)
+            self.assertLessEqual(max(int(r["iterations"]) for r in steps), 4)  # as the paper says
+            self.assertLess(max(float(r["residual_Nm"]) for r in steps), 1e-8)
+
+
+if __name__ == "__main__":
+    main()
