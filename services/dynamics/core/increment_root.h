@@ -23,7 +23,8 @@ class IncrementHistory {
   /// First guess of d: h qd while there is no past, else the polynomial through the last increments as a sum
   /// of backward differences, cut off where they stop falling: smooth motion gets a high order, rough motion
   /// a low one.
-  void guess(const Node& from, double h, VectorXd& d) noexcept {
+  template <class G>
+  void guess(const Node<G>& from, double h, VectorXd& d) noexcept {
     const std::vector<double>& s = from.history;
     const Eigen::Index n = d.size(), count = s[1] == h ? static_cast<Eigen::Index>(s[0]) : 0;
     d = h * from.qd;
@@ -45,7 +46,8 @@ class IncrementHistory {
   }
 
   /// Puts d in front of from's history and writes it to `to`.
-  static void push(const Node& from, double h, const VectorXd& d, Node& to) noexcept {
+  template <class G>
+  static void push(const Node<G>& from, double h, const VectorXd& d, Node<G>& to) noexcept {
     const std::vector<double>& s = from.history;
     const Eigen::Index n = d.size();
     const double count = s[1] == h ? s[0] : 0;
