@@ -5,7 +5,7 @@
 /// configuration, after which twists and wrenches pass from link to link by a translation alone.  What turns
 /// is in the frame: offset, first moment, prismatic axis.
 
-#include "common/lie/sincos.h"
+#include "common/lie/pack.h"
 #include "common/rbd/planar_chain.h"
 
 namespace hamel::rbd {
@@ -91,20 +91,35 @@ template <class S>
   }
 }
 
-/// All frames at q: angles add up along the chain, and each is turned into one sine and cosine.
+/// All frames at q: angles add up along the chain, and each is turned into one sine and cosine.  A frame
+/// keeps its angle in c until then, so that numbers alone may be turned two at a time.
+template <class S>
+[[gnu::always_inline]] inline void turn_all(int n, PlanarFrame<S>* X) noexcept {
+  for (int i = 0; i < n; ++i) lie::sincos(S(X[i].c), X[i].s, X[i].c);
+}
+[[gnu::always_inline]] inline void turn_all(int n, PlanarFrame<double>* X) noexcept {
+  using Pair = lie::Pack<2, lie::Baseline>;
+  for (int i = 0; i < n; i += 2) {
+    PlanarFrame<double>&x = X[i], &y = X[i + 1 < n ? i + 1 : i];
+    Pair s, c;
+    lie::sincos(Pair{{x.c, y.c}}, s, c);
+    x.c = c.v[0], x.s = s.v[0], y.c = c.v[1], y.s = s.v[1];
+  }
+}
 template <class S>
 [[gnu::always_inline]] inline void place(const PlanarChain& chain, const S* q, PlanarFrame<S>* X) noexcept {
-  S angle{}, c = angle + 1.0, s{};
+  S angle{};
+  for (int i = 0; i < chain.n(); ++i) {
+    if (!chain[i].prismatic) angle = angle + chain[i].sign * q[i];
+    X[i].c = angle;
+  }
+  turn_all(chain.n(), X);
+  S c = S{} + 1.0, s{};
   for (int i = 0; i < chain.n(); ++i) {
     const PlanarLink& k = chain[i];
     X[i].p = rotate(c, s, k.p_PJ);
-    if (k.prismatic) {
-      X[i].p = X[i].p + q[i] * rotate(c, s, k.axis);
-    } else {
-      angle = angle + k.sign * q[i];
-      lie::sincos(angle, s, c);
-    }
-    X[i].c = c, X[i].s = s;
+    if (k.prismatic) X[i].p = X[i].p + q[i] * rotate(c, s, k.axis);
+    c = X[i].c, s = X[i].s;
     X[i].h = rotate(c, s, k.h);
   }
 }

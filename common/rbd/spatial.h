@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "common/lie/sincos.h"
+#include "common/lie/pack.h"
 #include "common/rbd/axis_chain.h"
 
 namespace hamel::rbd {

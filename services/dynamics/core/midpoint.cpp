@@ -62,7 +62,7 @@ StepReport MidpointStep<G>::advance(const Node<G>& from, const Load<G>& load, do
 
 /// Joint torque over the step: commanded, damping by the mean rate, wrenches and stops at the midpoint.
 template <class G>
-double MidpointStep<G>::force(int i, double d) const noexcept {
+[[gnu::always_inline]] inline double MidpointStep<G>::force(int i, double d) const noexcept {
   const auto& k = chain_[i];
   double f = load_->tau[i] + push_[i] - k.damping * d / h_;
   if (options_.stop_stiffness > 0) f += stop_torque(k, options_.stop_stiffness, from_->q[i] + 0.5 * d);
@@ -105,12 +105,12 @@ void MidpointStep<G>::forward(const VectorXd& d) noexcept {
 
 template <class G>
 Residual MidpointStep<G>::backward(const VectorXd& d) noexcept {
-  Residual worst;
   typename G::template Motion<double> H;  // composite momentum
   typename G::template Direction<double>
       moment;  // composite first moment of mass: w_i = (moment x g, mass g)
   MomentumParts parts;
-  const double rate = 1 / h_;
+  const double rate = 1 / h_, half = 0.5 * h_;
+  double largest = 0, poison = 0, worst_size = 0, worst_scale = 1;  // of |r|; the worst by its scale
   for (int i = chain_.n(); i-- > 0;) {
     const auto& k = chain_[i];
     const auto& X = X_[at(i)];
@@ -121,22 +121,24 @@ Residual MidpointStep<G>::backward(const VectorXd& d) noexcept {
     moment_[at(i)] = moment;
     const double rotor = k.armature * d[i] * rate;
     const double p = along(k, X, H) + rotor;
-    const double turn =
-        0.5 * h_ * (coadjoint_along(k, X, V_[at(i)], H) + weight_along(k, X, moment, g_[at(i)]));
-    const double push = 0.5 * h_ * force(i, d[i]);
+    const double turn = half * (coadjoint_along(k, X, V_[at(i)], H) + weight_along(k, X, moment, g_[at(i)]));
+    const double push = half * force(i, d[i]);
     r_[i] = p - turn - from_->p[i] - push;
     p_next_[i] = p + turn + push;
     const double scale = std::abs(from_->p[i]) + parts.along(k) + std::abs(rotor) + std::abs(turn) +
                          std::abs(push) + h_ * k.weight + kNothing;
-    if (!std::isfinite(r_[i])) return {r_[i], r_[i]};
-    worst.torque_Nm = std::max(worst.torque_Nm, std::abs(r_[i]) * rate);
-    worst.relative = std::max(worst.relative, std::abs(r_[i]) / scale);
+    const double size = std::abs(r_[i]);
+    poison += size;
+    largest = std::max(largest, size);
+    const bool worse = size * worst_scale > worst_size * scale;
+    worst_size = worse ? size : worst_size, worst_scale = worse ? scale : worst_scale;
     if (i == 0) break;
     H = to_parent(X, H);
     parts.shift(X.p);
     moment = moment_to_parent(k, X, moment);
   }
-  return worst;
+  if (!std::isfinite(poison)) return {poison, poison};
+  return {largest * rate, worst_size / worst_scale};
 }
 
 template <class G>
