@@ -95,6 +95,7 @@ void read_dynamics(const Fields& read, scene::DynamicsOptions& o, std::string& b
   read("max_iterations", o.max_iterations);
   read("max_subdivisions", o.max_subdivisions);
   read("stop_stiffness", o.stop_stiffness);
+  read("space", o.space);
   read("bus", bus);
 }
 

@@ -28,107 +28,108 @@ template <class A, class B>
 using Prod = decltype(A{} * B{});
 
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator+(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> operator+(const Vec3<A>& a, const Vec3<B>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator-(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> operator-(const Vec3<A>& a, const Vec3<B>& b) {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator*(const A& s, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> operator*(const A& s, const Vec3<B>& b) {
   return {s * b.x, s * b.y, s * b.z};
 }
 template <class S>
-inline Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) {
+[[gnu::always_inline]] inline Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) {
   return a = a + b;
 }
 template <class S>
-inline Vec3<S>& operator-=(Vec3<S>& a, const Vec3<S>& b) {
+[[gnu::always_inline]] inline Vec3<S>& operator-=(Vec3<S>& a, const Vec3<S>& b) {
   return a = a - b;
 }
 
 template <class A, class B>
-inline Prod<A, B> dot(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Prod<A, B> dot(const Vec3<A>& a, const Vec3<B>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class A, class B>
-inline Vec3<Prod<A, B>> cross(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> cross(const Vec3<A>& a, const Vec3<B>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator*(const Mat3<A>& M, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> operator*(const Mat3<A>& M, const Vec3<B>& b) {
   return {M.x.x * b.x + M.y.x * b.y + M.z.x * b.z, M.x.y * b.x + M.y.y * b.y + M.z.y * b.z,
           M.x.z * b.x + M.y.z * b.y + M.z.z * b.z};
 }
 /// M^T b.
 template <class A, class B>
-inline Vec3<Prod<A, B>> transpose_times(const Mat3<A>& M, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> transpose_times(const Mat3<A>& M, const Vec3<B>& b) {
   return {dot(M.x, b), dot(M.y, b), dot(M.z, b)};
 }
 template <class A, class B>
-inline Vec3<Prod<A, B>> operator*(const Sym3<A>& M, const Vec3<B>& b) {
+[[gnu::always_inline]] inline Vec3<Prod<A, B>> operator*(const Sym3<A>& M, const Vec3<B>& b) {
   return {M.xx * b.x + M.xy * b.y + M.xz * b.z, M.xy * b.x + M.yy * b.y + M.yz * b.z,
           M.xz * b.x + M.yz * b.y + M.zz * b.z};
 }
 template <class A, class B>
-inline Mat3<Prod<A, B>> operator*(const Mat3<A>& M, const Mat3<B>& N) {
+[[gnu::always_inline]] inline Mat3<Prod<A, B>> operator*(const Mat3<A>& M, const Mat3<B>& N) {
   return {M * N.x, M * N.y, M * N.z};
 }
 template <class S>
-inline Mat3<S> operator+(const Mat3<S>& M, const Mat3<S>& N) {
+[[gnu::always_inline]] inline Mat3<S> operator+(const Mat3<S>& M, const Mat3<S>& N) {
   return {M.x + N.x, M.y + N.y, M.z + N.z};
 }
 template <class S>
-inline Sym3<S> operator+(const Sym3<S>& M, const Sym3<S>& N) {
+[[gnu::always_inline]] inline Sym3<S> operator+(const Sym3<S>& M, const Sym3<S>& N) {
   return {M.xx + N.xx, M.yy + N.yy, M.zz + N.zz, M.xy + N.xy, M.xz + N.xz, M.yz + N.yz};
 }
 template <class S>
-inline Sym3<S>& operator+=(Sym3<S>& M, const Sym3<S>& N) {
+[[gnu::always_inline]] inline Sym3<S>& operator+=(Sym3<S>& M, const Sym3<S>& N) {
   return M = M + N;
 }
 template <class S>
-inline Mat3<S>& operator+=(Mat3<S>& M, const Mat3<S>& N) {
+[[gnu::always_inline]] inline Mat3<S>& operator+=(Mat3<S>& M, const Mat3<S>& N) {
   return M = M + N;
 }
 template <class S>
-inline Mat3<S> transpose(const Mat3<S>& M) {
+[[gnu::always_inline]] inline Mat3<S> transpose(const Mat3<S>& M) {
   return {{M.x.x, M.y.x, M.z.x}, {M.x.y, M.y.y, M.z.y}, {M.x.z, M.y.z, M.z.z}};
 }
 
 /// hat(p) N: the columns p x n.
 template <class A, class B>
-inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Mat3<B>& N) {
+[[gnu::always_inline]] inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Mat3<B>& N) {
   return {cross(p, N.x), cross(p, N.y), cross(p, N.z)};
 }
 /// hat(p) M.
 template <class A, class B>
-inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Sym3<B>& M) {
+[[gnu::always_inline]] inline Mat3<Prod<A, B>> cross(const Vec3<A>& p, const Sym3<B>& M) {
   return {cross(p, Vec3<B>{M.xx, M.xy, M.xz}), cross(p, Vec3<B>{M.xy, M.yy, M.yz}),
           cross(p, Vec3<B>{M.xz, M.yz, M.zz})};
 }
 /// W + W^T.
 template <class S>
-inline Sym3<S> twice_symmetric(const Mat3<S>& W) {
+[[gnu::always_inline]] inline Sym3<S> twice_symmetric(const Mat3<S>& W) {
   return {W.x.x + W.x.x, W.y.y + W.y.y, W.z.z + W.z.z, W.y.x + W.x.y, W.z.x + W.x.z, W.z.y + W.y.z};
 }
 /// M - s a a^T.
 template <class S>
-inline Sym3<S> minus_outer(const Sym3<S>& M, const S& s, const Vec3<S>& a) {
+[[gnu::always_inline]] inline Sym3<S> minus_outer(const Sym3<S>& M, const S& s, const Vec3<S>& a) {
   const Vec3<S> b = s * a;
   return {M.xx - b.x * a.x, M.yy - b.y * a.y, M.zz - b.z * a.z,
           M.xy - b.x * a.y, M.xz - b.x * a.z, M.yz - b.y * a.z};
 }
 /// M - s a b^T.
 template <class S>
-inline Mat3<S> minus_outer(const Mat3<S>& M, const S& s, const Vec3<S>& a, const Vec3<S>& b) {
+[[gnu::always_inline]] inline Mat3<S> minus_outer(const Mat3<S>& M, const S& s, const Vec3<S>& a,
+                                                  const Vec3<S>& b) {
   const Vec3<S> c = s * a;
   return {M.x - b.x * c, M.y - b.y * c, M.z - b.z * c};
 }
 /// R M R^T for symmetric M.
 template <class A, class B>
-inline Sym3<Prod<A, B>> rotate(const Mat3<A>& R, const Sym3<B>& M) {
+[[gnu::always_inline]] inline Sym3<Prod<A, B>> rotate(const Mat3<A>& R, const Sym3<B>& M) {
   using S = Prod<A, B>;
   const Vec3<S> tx = R * Vec3<B>{M.xx, M.xy, M.xz}, ty = R * Vec3<B>{M.xy, M.yy, M.yz},
                 tz = R * Vec3<B>{M.xz, M.yz, M.zz};
@@ -141,23 +142,25 @@ inline Sym3<Prod<A, B>> rotate(const Mat3<A>& R, const Sym3<B>& M) {
 }
 /// R H R^T.
 template <class A, class B>
-inline Mat3<Prod<A, B>> rotate(const Mat3<A>& R, const Mat3<B>& H) {
+[[gnu::always_inline]] inline Mat3<Prod<A, B>> rotate(const Mat3<A>& R, const Mat3<B>& H) {
   const auto T = R * H;  // R H, then times R^T: column j is sum_k T_k R_jk
   return {R.x.x * T.x + R.y.x * T.y + R.z.x * T.z, R.x.y * T.x + R.y.y * T.y + R.z.y * T.z,
           R.x.z * T.x + R.y.z * T.y + R.z.z * T.z};
 }
 
 /// hat(a).
-inline Mat3<double> hat3(const Vec3<double>& a) { return {{0, a.z, -a.y}, {-a.z, 0, a.x}, {a.y, -a.x, 0}}; }
-inline Mat3<double> full(const Sym3<double>& M) {
+[[gnu::always_inline]] inline Mat3<double> hat3(const Vec3<double>& a) {
+  return {{0, a.z, -a.y}, {-a.z, 0, a.x}, {a.y, -a.x, 0}};
+}
+[[gnu::always_inline]] inline Mat3<double> full(const Sym3<double>& M) {
   return {{M.xx, M.xy, M.xz}, {M.xy, M.yy, M.yz}, {M.xz, M.yz, M.zz}};
 }
 
-inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }
-inline Mat3<double> mat3(const Eigen::Matrix3d& M) {
+[[gnu::always_inline]] inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }
+[[gnu::always_inline]] inline Mat3<double> mat3(const Eigen::Matrix3d& M) {
   return {vec3(M.col(0)), vec3(M.col(1)), vec3(M.col(2))};
 }
-inline Sym3<double> sym3(const Eigen::Matrix3d& M) {
+[[gnu::always_inline]] inline Sym3<double> sym3(const Eigen::Matrix3d& M) {
   return {M(0, 0),
           M(1, 1),
           M(2, 2),

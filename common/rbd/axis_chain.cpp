@@ -5,19 +5,6 @@
 namespace hamel::rbd {
 namespace {
 
-/// A rotation whose third column is the unit vector `axis`; the identity where the axis is e_3 already, so
-/// that robots modelled about z keep their digits.
-Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {
-  if (axis == Eigen::Vector3d::UnitZ()) return Eigen::Matrix3d::Identity();
-  Eigen::Index least = 0;
-  axis.cwiseAbs().minCoeff(&least);
-  Eigen::Matrix3d R;
-  R.col(2) = axis.normalized();
-  R.col(0) = Eigen::Vector3d::Unit(least).cross(R.col(2)).normalized();
-  R.col(1) = R.col(2).cross(R.col(0));
-  return R;
-}
-
 /// Mass and weight beyond each joint, from the tip: what the arm weighs when stretched out level.
 void sum_outward(std::vector<AxisLink>& links, double gravity, double& energy_scale) {
   double mass = 0, moment = 0;  // moment: sum of mass times stretched distance from this joint
@@ -34,7 +21,23 @@ void sum_outward(std::vector<AxisLink>& links, double gravity, double& energy_sc
 
 }  // namespace
 
-AxisChain::AxisChain(const model::Chain& chain) : gravity_W(lie::vec3(chain.gravity_W_mps2())) {
+Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {
+  if (axis == Eigen::Vector3d::UnitZ()) return Eigen::Matrix3d::Identity();
+  Eigen::Index least = 0;
+  axis.cwiseAbs().minCoeff(&least);
+  Eigen::Matrix3d R;
+  R.col(2) = axis.normalized();
+  R.col(0) = Eigen::Vector3d::Unit(least).cross(R.col(2)).normalized();
+  R.col(1) = R.col(2).cross(R.col(0));
+  return R;
+}
+
+AxisChain::AxisChain(const model::Chain& chain) : links(static_cast<std::size_t>(chain.n())) {
+  assign(chain);
+}
+
+void AxisChain::assign(const model::Chain& chain) noexcept {
+  gravity_W = lie::vec3(chain.gravity_W_mps2());
   lie::Pose X_PZ =
       chain.X_WB0();  // parent link's frame seen from the parent's axis frame; the base from the world
   for (int i = 0; i < chain.n(); ++i) {
@@ -45,7 +48,7 @@ AxisChain::AxisChain(const model::Chain& chain) : gravity_W(lie::vec3(chain.grav
     const Eigen::Vector3d c = R_BZ.transpose() * body.com_m;
     const Eigen::Matrix3d about_com = R_BZ.transpose() * body.about_com_kgm2 * R_BZ;
     const Eigen::Matrix3d shift = c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose();
-    AxisLink a;
+    AxisLink& a = links[static_cast<std::size_t>(i)];
     a.R_PJ = lie::mat3(X.R * R_BZ);
     a.p_PJ = lie::vec3(X.p);
     a.mass = body.mass_kg;
@@ -56,7 +59,6 @@ AxisChain::AxisChain(const model::Chain& chain) : gravity_W(lie::vec3(chain.grav
     a.lower = joint.limits.lower;
     a.upper = joint.limits.upper;
     a.prismatic = joint.kind == model::JointKind::prismatic;
-    links.push_back(a);
     X_PZ = {R_BZ.transpose(), Eigen::Vector3d::Zero()};
   }
   sum_outward(links, chain.gravity_W_mps2().norm(), energy_scale);

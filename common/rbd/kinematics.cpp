@@ -50,12 +50,7 @@ Workspace::Workspace(const model::Chain& chain)
       X_WB(at(chain.n())),
       V_B(at(chain.n()), Twist::Zero()),
       axis(chain),
-      X(at(chain.n())),
-      V(at(chain.n())),
-      F(at(chain.n())),
-      c(at(chain.n())),
-      factor(at(chain.n())),
-      u(at(chain.n())) {}
+      sweep(chain.n()) {}
 
 void positions(const model::Chain& chain, Ref<const VectorXd> q, Workspace& ws) noexcept {
   assert(q.size() == chain.n());

@@ -27,10 +27,7 @@ struct Workspace {
 
   // For inverse_dynamics() and forward_dynamics(), in axis frames; no meaning between calls.
   AxisChain axis;
-  std::vector<LinkPose<double>> X;
-  std::vector<Half6<double>> V, F, c;
-  std::vector<JointFactor<double>> factor;
-  std::vector<double> u;
+  Sweep<SE3> sweep;
 };
 
 /// Poses of all links.  Eqs. (3), (4).

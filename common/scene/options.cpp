@@ -107,6 +107,16 @@ const char* to_string(Start v) {
   return "?";
 }
 
+const char* to_string(Space v) {
+  switch (v) {
+    case Space::automatic:
+      return "automatic";
+    case Space::se3:
+      return "se3";
+  }
+  return "?";
+}
+
 const char* to_string(Method v) {
   switch (v) {
     case Method::attract:

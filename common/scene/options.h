@@ -16,6 +16,7 @@ inline constexpr double kInf = std::numeric_limits<double>::infinity();
 enum class Tier : std::uint8_t { hamel, midpoint, gauss, semi_implicit_euler, rk4, dopri8 };
 enum class Root : std::uint8_t { feedback, newton };
 enum class Start : std::uint8_t { extrapolated, previous };
+enum class Space : std::uint8_t { automatic, se3 };
 
 /// How the arm is integrated.
 struct DynamicsOptions {
@@ -31,6 +32,7 @@ struct DynamicsOptions {
   int max_iterations = 32;       ///< root-finding budget of one step, >= 1
   int max_subdivisions = 6;      ///< a step that does not converge is halved up to this often, 0..20
   double stop_stiffness = 0;     ///< smooth hard stops at joint limits [N m/rad], 0: none
+  Space space = Space::automatic;  ///< a planar arm is computed on SE(2), unless se3 is asked for
 };
 
 enum class Method : std::uint8_t { attract, khatib, gyro_paper, gyro };
@@ -90,6 +92,7 @@ Problems problems(const PlannerOptions& o);
 const char* to_string(Tier v);
 const char* to_string(Root v);
 const char* to_string(Start v);
+const char* to_string(Space v);
 const char* to_string(Method v);
 const char* to_string(GainForm v);
 const char* to_string(Mapping v);

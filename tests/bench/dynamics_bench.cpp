@@ -1,5 +1,5 @@
-// What the recursions and a step cost, against the number of joints.  Times are for reading and for ratios in one
-// run; no test asserts them.
+// What the recursions and a step cost, against the number of joints.  Times are for reading and for ratios in
+// one run; no test asserts them.
 //   cmake --preset core -B build/bench -DHAMEL_BENCH=ON && ninja -C build/bench dynamics_bench
 //   build/bench/tests/bench/dynamics_bench
 #include <benchmark/benchmark.h>
@@ -68,14 +68,17 @@ void step(benchmark::State& state, dynamics::Options options, int n) {
 }
 
 using scene::Root;
+using scene::Space;
 using scene::Tier;
-#define STEP(name, ...)                                                                  \
-  void name(benchmark::State& state) {                                                   \
-    step(state, dynamics::Options{__VA_ARGS__}, static_cast<int>(state.range(0)));       \
-  }                                                                                      \
-  BENCHMARK(name)->Arg(3)->Arg(7)->Arg(30)->Arg(100)->Arg(1000)
+#define STEP(name, ...)                                                            \
+  void name(benchmark::State& state) {                                             \
+    step(state, dynamics::Options{__VA_ARGS__}, static_cast<int>(state.range(0))); \
+  }                                                                                \
+  BENCHMARK(name)->Arg(3)->Arg(4)->Arg(7)->Arg(30)->Arg(100)->Arg(1000)
 STEP(midpoint_1ms, .tier = Tier::midpoint, .dt_s = 1e-3);
 STEP(midpoint_10ms, .tier = Tier::midpoint, .dt_s = 1e-2);
+STEP(midpoint_1ms_se3, .tier = Tier::midpoint, .dt_s = 1e-3, .space = Space::se3);
+STEP(midpoint_10ms_se3, .tier = Tier::midpoint, .dt_s = 1e-2, .space = Space::se3);
 STEP(midpoint_newton_10ms, .tier = Tier::midpoint, .dt_s = 1e-2, .root = Root::newton);
 STEP(gauss4_10ms, .tier = Tier::gauss, .dt_s = 1e-2, .stages = 4);
 STEP(rk4_1ms, .tier = Tier::rk4, .dt_s = 1e-3);

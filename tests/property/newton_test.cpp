@@ -19,12 +19,14 @@ INSTANTIATE_TEST_SUITE_P(Property, Newton, testing::Range(0u, 40u));
 TEST_P(Newton, JacobianIsTheSlopeOfTheResidual) {
   const rbd::AxisChain chain(test::random_chain(rng, n, {.prismatic = 0.4, .armature = 0.5, .damping = 0.5}));
   const double h = 0.02;
-  MidpointStep step(chain, {.dt_s = h, .root = Root::newton});
-  Node from(chain);
+  MidpointStep<SE3> step(chain, {.dt_s = h, .root = Root::newton});
+  Node<SE3> from(chain);
   from.place(chain, rng.vector(n, 3));
   from.move_with_velocity(chain, rng.vector(n, 3));
-  const VectorXd tau = rng.vector(n, 2), d = h * rng.vector(n, 5), x = rng.vector(n, 1);
-  step.begin(from, tau, h);
+  Load<SE3> load(n);
+  load.tau = rng.vector(n, 2);
+  const VectorXd d = h * rng.vector(n, 5), x = rng.vector(n, 1);
+  step.begin(from, load, h);
   const double e = 1e-6;
   (void)step.evaluate(d + e * x);
   VectorXd slope = step.residual();

@@ -123,4 +123,19 @@ inline model::Chain random_chain(Random& rng, int n, const RandomChain& how = {}
   return checked(random_spec(rng, n, how));
 }
 
+/// A random chain that moves in one plane somewhere in space: axes either way round, links off the plane.
+inline model::ChainSpec random_planar_spec(Random& rng, int n, const RandomChain& how = {}) {
+  model::ChainSpec spec = random_spec(rng, n, how);
+  const auto turn_z = [](double angle) { return lie::exp_so3(Eigen::Vector3d(0, 0, angle)); };
+  for (int i = 0; i < n; ++i) {
+    model::Joint& joint = spec.joints[static_cast<std::size_t>(i)];
+    joint.X_PJ.R = turn_z(rng.uniform(-3, 3));
+    if (i == 0) joint.kind = model::JointKind::revolute;
+    const bool slides = joint.kind == model::JointKind::prismatic;
+    joint.axis = slides ? Eigen::Vector3d(turn_z(rng.uniform(-3, 3)).col(0))
+                        : Eigen::Vector3d(0, 0, rng.coin(0.3) ? -1 : 1);
+  }
+  return spec;
+}
+
 }  // namespace hamel::test

@@ -80,10 +80,11 @@ constexpr double kSafety = 0.9, kShrink = 1. / 3, kGrow = 6;
 constexpr int kMaxSteps = 5000;  // of one output interval, which is halved when they do not suffice
 }  // namespace
 
-Dopri8Step::Dopri8Step(const model::Chain& chain, const rbd::AxisChain& axis, const Options& options)
-    : axis_(axis),
+template <class G>
+Dopri8Step<G>::Dopri8Step(const typename G::Chain& chain, const Options& options)
+    : chain_(chain),
       tolerance_(options.tolerance_rel),
-      field_(chain, axis, options.stop_stiffness),
+      field_(chain, options.stop_stiffness),
       q_(VectorXd::Zero(chain.n())),
       qd_(q_),
       q_new_(q_),
@@ -94,7 +95,8 @@ Dopri8Step::Dopri8Step(const model::Chain& chain, const rbd::AxisChain& axis, co
 
 /// From (q_, qd_) with stage 0 filled, to (q_new_, qd_new_).  Returns the error against the tolerance: <= 1
 /// is good.
-double Dopri8Step::try_step(double h, const VectorXd& tau) noexcept {
+template <class G>
+double Dopri8Step<G>::try_step(double h, const Load<G>& load) noexcept {
   const auto add = [&](const std::array<double, 12>& weights, int count, VectorXd& q, VectorXd& qd) {
     for (int j = 0; j < count; ++j) {
       const std::size_t s = static_cast<std::size_t>(j);
@@ -107,7 +109,7 @@ double Dopri8Step::try_step(double h, const VectorXd& tau) noexcept {
     const std::size_t s = static_cast<std::size_t>(i);
     q_new_ = q_, rate_[s] = qd_;
     add(Dop853::a[s], i, q_new_, rate_[s]);
-    power_[s] = field_(q_new_, rate_[s], tau, acceleration_[s]);
+    power_[s] = field_(q_new_, rate_[s], load, acceleration_[s]);
   }
   q_new_ = q_, qd_new_ = qd_;
   add(Dop853::b, Dop853::kStages, q_new_, qd_new_);
@@ -129,17 +131,19 @@ double Dopri8Step::try_step(double h, const VectorXd& tau) noexcept {
 }
 
 /// A first step that is too short rather than too long: the controller grows it.
-double Dopri8Step::first_step(double h) const noexcept {
+template <class G>
+double Dopri8Step<G>::first_step(double h) const noexcept {
   const double speed = 1 + qd_.lpNorm<Eigen::Infinity>(), push = acceleration_[0].lpNorm<Eigen::Infinity>();
   return std::min(h, 0.01 * speed / std::max(push, speed));
 }
 
-StepReport Dopri8Step::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
+template <class G>
+StepReport Dopri8Step<G>::advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept {
   StepReport report;
   q_ = from.q, qd_ = from.qd;
   const auto evaluate_first = [&] {
     rate_[0] = qd_;
-    power_[0] = field_(q_, qd_, tau, acceleration_[0]);
+    power_[0] = field_(q_, qd_, load, acceleration_[0]);
     ++report.evaluations;
   };
   evaluate_first();
@@ -147,7 +151,7 @@ StepReport Dopri8Step::advance(const Node& from, const VectorXd& tau, double h, 
   while (done < h) {
     // no crumb is left for a last step
     const double left = h - done, step = next > 0.99 * left ? left : std::min(next, 0.5 * left);
-    const double error = try_step(step, tau);
+    const double error = try_step(step, load);
     report.evaluations += Dop853::kStages - 1;
     if (!std::isfinite(error) || ++report.iterations > kMaxSteps || step < 1e-13 * h) return report;
     const double factor = kSafety * std::pow(std::max(error, 1e-30), -1. / 8);
@@ -162,10 +166,13 @@ StepReport Dopri8Step::advance(const Node& from, const VectorXd& tau, double h, 
     if (done < h) evaluate_first();
   }
   to.history[0] = next;
-  to.place(axis_, q_);
-  to.move_with_velocity(axis_, qd_);
+  to.place(chain_, q_);
+  to.move_with_velocity(chain_, qd_);
   report.stop = Stop::explicit_step;
   return report;
 }
+
+template class Dopri8Step<SE3>;
+template class Dopri8Step<SE2>;
 
 }  // namespace hamel::dynamics

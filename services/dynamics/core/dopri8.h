@@ -19,20 +19,21 @@ struct Dop853 {
   static const std::array<std::array<double, kStages>, kStages> a;
 };
 
-class Dopri8Step final : public TierStep {
+template <class G>
+class Dopri8Step final : public TierStep<G> {
  public:
-  Dopri8Step(const model::Chain& chain, const rbd::AxisChain& axis, const Options& options);
+  Dopri8Step(const typename G::Chain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return 1; }  ///< the step it would take next [s]
   bool integrates_velocity() const noexcept override { return true; }
-  StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
+  StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
  private:
-  double try_step(double h, const VectorXd& tau) noexcept;
+  double try_step(double h, const Load<G>& load) noexcept;
   double first_step(double h) const noexcept;
 
-  const rbd::AxisChain& axis_;
+  const typename G::Chain& chain_;
   const double tolerance_;
-  Field field_;
+  Field<G> field_;
   VectorXd q_, qd_, q_new_, qd_new_;
   std::array<VectorXd, Dop853::kStages> rate_, acceleration_;  ///< qd and qdd at the stages
   std::array<double, Dop853::kStages> power_{};

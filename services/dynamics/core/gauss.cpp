@@ -56,7 +56,8 @@ GaussMethod::GaussMethod(int stages) : c(stages), b(stages), a(stages, stages), 
   }
 }
 
-GaussStep::GaussStep(const rbd::AxisChain& chain, const Options& options)
+template <class G>
+GaussStep<G>::GaussStep(const Chain& chain, const Options& options)
     : chain_(chain),
       options_(options),
       method_(options.stages),
@@ -71,12 +72,18 @@ GaussStep::GaussStep(const rbd::AxisChain& chain, const Options& options)
       factor_(at(chain.n())),
       momentum_(at(chain.n())),
       V_(at(chain.n())),
-      g_(at(chain.n())) {}
+      g_(at(chain.n())),
+      push_(chain.n()),
+      pushed_(x_.V) {}
 
 /// [h, V, F] of the last step; h = 0: none.
-std::size_t GaussStep::history_size() const noexcept { return 1 + static_cast<std::size_t>(2 * x_.V.size()); }
+template <class G>
+std::size_t GaussStep<G>::history_size() const noexcept {
+  return 1 + static_cast<std::size_t>(2 * x_.V.size());
+}
 
-void GaussStep::remember(const Stages& x, Node& to) const noexcept {
+template <class G>
+void GaussStep<G>::remember(const Stages& x, Node<G>& to) const noexcept {
   to.history[0] = h_;
   std::copy_n(x.V.data(), x.V.size(), to.history.data() + 1);
   std::copy_n(x.F.data(), x.F.size(), to.history.data() + 1 + x.V.size());
@@ -84,7 +91,8 @@ void GaussStep::remember(const Stages& x, Node& to) const noexcept {
 
 /// The last step's collocation polynomials carried on; the state at rest in its own velocity where there is
 /// none.
-void GaussStep::guess(Stages& x) noexcept {
+template <class G>
+void GaussStep<G>::guess(Stages& x) noexcept {
   const Eigen::Index n = x.V.rows(), s = x.V.cols();
   if (from_->history[0] != h_ || options_.start == Start::previous) {
     x.V.colwise() = from_->qd;
@@ -96,44 +104,47 @@ void GaussStep::guess(Stages& x) noexcept {
   x.F.noalias() = F.lazyProduct(method_.extrapolate.transpose());
 }
 
-double GaussStep::force(int i, double q, double qd) const noexcept {
-  const rbd::AxisLink& k = chain_[i];
-  double f = (*tau_)[i] - k.damping * qd;
-  if (options_.stop_stiffness > 0) f += stop_torque(k, options_.stop_stiffness, q);
+template <class G>
+double GaussStep<G>::force(int i, Eigen::Index j, double qd) const noexcept {
+  const auto& k = chain_[i];
+  double f = load_->tau[i] + pushed_(i, j) - k.damping * qd;
+  if (options_.stop_stiffness > 0) f += stop_torque(k, options_.stop_stiffness, Q_(i, j));
   return f;
 }
 
 /// V = M(Q)^-1 P and F = dL/dq + joint torques at stage j.
-void GaussStep::evaluate_stage(Eigen::Index j) noexcept {
-  lie::Vec3<double> g = chain_.gravity_W;
-  for (int i = 0; i < chain_.n(); ++i) {
-    X_[at(i)] = rbd::pose_at(chain_[i], Q_(i, j));
-    g_[at(i)] = g = transpose_times(X_[at(i)].R, g);
-  }
-  rbd::factorise<double>(chain_, X_.data(), nullptr, factor_.data());
+template <class G>
+void GaussStep<G>::evaluate_stage(Eigen::Index j) noexcept {
+  auto g = chain_.gravity_W;
+  rbd::place(chain_, Q_.col(j).data(), X_.data());
+  for (int i = 0; i < chain_.n(); ++i) g_[at(i)] = g = turn_to_child(X_[at(i)], g);
+  push_.evaluate(chain_, X_, *load_);
+  rbd::factorise<G, double>(chain_, X_.data(), nullptr, factor_.data());
   double* const rate = next_.V.col(j).data();
-  rbd::solve(chain_, X_.data(), factor_.data(), P_.col(j).data(), u_.data(), rate);
-  rbd::Half6<double> V, H;
+  rbd::solve<G, double>(chain_, X_.data(), factor_.data(), P_.col(j).data(), u_.data(), rate);
+  typename G::template Motion<double> V, H;
   for (int i = 0; i < chain_.n(); ++i) {
     V = to_child(X_[at(i)], V);
-    along(chain_[i], V) += rate[i];
+    add_along(chain_[i], X_[at(i)], V, rate[i]);
     V_[at(i)] = V;
-    momentum_[at(i)] = momentum(chain_[i], V);
+    momentum_[at(i)] = momentum(chain_[i], X_[at(i)], V);
   }
-  lie::Vec3<double> moment;
+  typename G::template Direction<double> moment;
   for (int i = chain_.n(); i-- > 0;) {
-    const rbd::AxisLink& k = chain_[i];
-    const lie::Vec3<double>& gi = g_[at(i)];
+    const auto& k = chain_[i];
+    const auto& X = X_[at(i)];
     H = H + momentum_[at(i)];
-    moment += k.h;
-    const double weight = k.prismatic ? k.outer_mass * gi.z : moment.x * gi.y - moment.y * gi.x;
-    next_.F(i, j) = coadjoint_along(k, V_[at(i)], H) + weight + force(i, Q_(i, j), rate[i]);
-    H = to_parent(X_[at(i)], H);
-    moment = X_[at(i)].R * moment + k.outer_mass * X_[at(i)].p;
+    add_moment(k, X, moment);
+    pushed_(i, j) = push_[i];
+    next_.F(i, j) =
+        coadjoint_along(k, X, V_[at(i)], H) + weight_along(k, X, moment, g_[at(i)]) + force(i, j, rate[i]);
+    H = to_parent(X, H);
+    moment = moment_to_parent(k, X, moment);
   }
 }
 
-Residual GaussStep::evaluate(const Stages& x) noexcept {
+template <class G>
+Residual GaussStep<G>::evaluate(const Stages& x) noexcept {
   Q_.noalias() = h_ * x.V.lazyProduct(method_.a.transpose());
   Q_.colwise() += from_->q;
   P_.noalias() = h_ * x.F.lazyProduct(method_.a.transpose());
@@ -156,13 +167,15 @@ Residual GaussStep::evaluate(const Stages& x) noexcept {
 }
 
 /// Fixed point: the stages that followed become the stages.
-void GaussStep::correct(Stages& x) noexcept {
+template <class G>
+void GaussStep<G>::correct(Stages& x) noexcept {
   x.V.swap(next_.V);
   x.F.swap(next_.F);
 }
 
-StepReport GaussStep::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
-  from_ = &from, tau_ = &tau, h_ = h;
+template <class G>
+StepReport GaussStep<G>::advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept {
+  from_ = &from, load_ = &load, h_ = h;
   for (int i = 0; i < chain_.n(); ++i) inertia_[i] = 1 / from.factor[at(i)].D_inv;
   guess(x_);
   StepReport report = find_root(*this, options_, x_);
@@ -173,7 +186,7 @@ StepReport GaussStep::advance(const Node& from, const VectorXd& tau, double h, N
     u_ += h * method_.b[j] * x_.V.col(j);
     p_next_ += h * method_.b[j] * x_.F.col(j);
     for (int i = 0; i < chain_.n(); ++i) {
-      report.work_J += h * method_.b[j] * force(i, Q_(i, j), x_.V(i, j)) * x_.V(i, j);
+      report.work_J += h * method_.b[j] * force(i, j, x_.V(i, j)) * x_.V(i, j);
     }
   }
   remember(x_, to);
@@ -181,5 +194,8 @@ StepReport GaussStep::advance(const Node& from, const VectorXd& tau, double h, N
   to.move_with_momentum(chain_, p_next_);
   return report;
 }
+
+template class GaussStep<SE3>;
+template class GaussStep<SE2>;
 
 }  // namespace hamel::dynamics

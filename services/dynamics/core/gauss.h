@@ -33,11 +33,14 @@ struct Stages {
   MatrixXd V, F;
 };
 
-class GaussStep final : public TierStep {
+template <class G>
+class GaussStep final : public TierStep<G> {
  public:
-  GaussStep(const rbd::AxisChain& chain, const Options& options);
+  using Chain = typename G::Chain;
+  GaussStep(const Chain& chain, const Options& options);
   std::size_t history_size() const noexcept override;
-  StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
+  bool keeps_energy() const noexcept override { return true; }
+  StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
   /// The stages that follow from `x`, and how far they are from it.
   Residual evaluate(const Stages& x) noexcept;
@@ -45,23 +48,25 @@ class GaussStep final : public TierStep {
 
  private:
   void guess(Stages& x) noexcept;
-  void remember(const Stages& x, Node& to) const noexcept;
+  void remember(const Stages& x, Node<G>& to) const noexcept;
   void evaluate_stage(Eigen::Index j) noexcept;
-  double force(int i, double q, double qd) const noexcept;
+  double force(int i, Eigen::Index j, double qd) const noexcept;
 
-  const rbd::AxisChain& chain_;
+  const Chain& chain_;
   const Options options_;
   const GaussMethod method_;
-  const Node* from_ = nullptr;
-  const VectorXd* tau_ = nullptr;
+  const Node<G>* from_ = nullptr;
+  const Load<G>* load_ = nullptr;
   double h_ = 0;
   Stages x_, next_;
   MatrixXd Q_, P_;
   VectorXd inertia_, u_, p_next_;  ///< inertia_: A^T I^A A of each joint, what turns rates into momenta
-  LinkPoses X_;
-  JointFactors factor_;
-  std::vector<rbd::Half6<double>> momentum_, V_;
-  std::vector<rbd::Vec3<double>> g_;
+  Frames<G> X_;
+  Factors<G> factor_;
+  Motions<G> momentum_, V_;
+  std::vector<typename G::template Direction<double>> g_;
+  Push<G> push_;
+  MatrixXd pushed_;  ///< torques of wrenches at the stages
 };
 
 }  // namespace hamel::dynamics

@@ -18,34 +18,40 @@ class IncrementHistory {
   static constexpr int kDepth = 7;
   static std::size_t size(int n) noexcept { return 2 + static_cast<std::size_t>(kDepth * n); }
 
-  explicit IncrementHistory(int n) : difference_(Eigen::MatrixXd::Zero(n, kDepth)) {}
+  explicit IncrementHistory(int n) : difference_(static_cast<std::size_t>(kDepth * n)) {}
 
   /// First guess of d: h qd while there is no past, else the polynomial through the last increments as a sum
   /// of backward differences, cut off where they stop falling: smooth motion gets a high order, rough motion
   /// a low one.
-  void guess(const Node& from, double h, VectorXd& d) noexcept {
+  template <class G>
+  void guess(const Node<G>& from, double h, VectorXd& d) noexcept {
     const std::vector<double>& s = from.history;
-    const Eigen::Index n = d.size(), count = s[1] == h ? static_cast<Eigen::Index>(s[0]) : 0;
+    const Eigen::Index n = d.size();
+    const int count = s[1] == h ? static_cast<int>(s[0]) : 0;
     d = h * from.qd;
     if (count == 0) return;
-    difference_.leftCols(count) = Eigen::Map<const Eigen::MatrixXd>(s.data() + 2, n, count);
-    if (count == 1) {
-      d = 2 * d - difference_.col(0);  // h qd lies between the two increments
+    const double* last = s.data() + 2;
+    if (count == 1) {  // h qd lies between the two increments
+      for (Eigen::Index i = 0; i < n; ++i) d[i] = 2 * d[i] - last[i];
       return;
     }
-    d = difference_.col(0);
-    double before = d.lpNorm<1>();
-    for (Eigen::Index order = 1; order < count; ++order) {
-      for (Eigen::Index k = 0; k + order < count; ++k) difference_.col(k) -= difference_.col(k + 1);
-      const double size = difference_.col(0).lpNorm<1>();
+    // the newest differences lie in front: one flat subtraction an order
+    double* v = difference_.data();
+    std::copy_n(last, count * n, v);
+    std::copy_n(v, n, d.data());
+    double before = size_of(v, n);
+    for (Eigen::Index left = (count - 1) * n; left > 0; left -= n) {
+      for (Eigen::Index j = 0; j < left; ++j) v[j] -= v[j + n];
+      const double size = size_of(v, n);
       if (size >= 0.5 * before) return;
-      d += difference_.col(0);
+      for (Eigen::Index i = 0; i < n; ++i) d[i] += v[i];
       before = size;
     }
   }
 
   /// Puts d in front of from's history and writes it to `to`.
-  static void push(const Node& from, double h, const VectorXd& d, Node& to) noexcept {
+  template <class G>
+  static void push(const Node<G>& from, double h, const VectorXd& d, Node<G>& to) noexcept {
     const std::vector<double>& s = from.history;
     const Eigen::Index n = d.size();
     const double count = s[1] == h ? s[0] : 0;
@@ -56,7 +62,12 @@ class IncrementHistory {
   }
 
  private:
-  Eigen::MatrixXd difference_;
+  static double size_of(const double* v, Eigen::Index n) noexcept {
+    double size = 0;
+    for (Eigen::Index i = 0; i < n; ++i) size += std::abs(v[i]);
+    return size;
+  }
+  std::vector<double> difference_;
 };
 
 /// Turn bound of the tiers that find increments [rad].

@@ -18,15 +18,18 @@
 
 namespace hamel::dynamics {
 
-class MidpointStep final : public TierStep {
+template <class G>
+class MidpointStep final : public TierStep<G> {
  public:
-  MidpointStep(const rbd::AxisChain& chain, const Options& options);
+  using Chain = typename G::Chain;
+  MidpointStep(const Chain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
+  bool keeps_energy() const noexcept override { return true; }
   double turn_bound() const noexcept override { return kTurnBound; }
-  StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
+  StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
   /// The step that evaluate() and correct() are about.
-  void begin(const Node& from, const VectorXd& tau, double h) noexcept;
+  void begin(const Node<G>& from, const Load<G>& load, double h) noexcept;
   /// Residual p^-(d) - p_k - (h/2) F.
   Residual evaluate(const VectorXd& d) noexcept;
   const VectorXd& residual() const noexcept { return r_; }
@@ -40,28 +43,35 @@ class MidpointStep final : public TierStep {
   void choose_factorisation(const VectorXd& d) noexcept;
   void forward(const VectorXd& d) noexcept;
   Residual backward(const VectorXd& d) noexcept;
-  JointRow row(int i, double d) const noexcept;
+  JointRow<G> row(int i, double d) const noexcept;
+  double diagonal(int i, double d) const noexcept;
   double force(int i, double d) const noexcept;
 
-  const rbd::AxisChain& chain_;
+  const Chain& chain_;
   const Options options_;
   IncrementHistory history_;
   // the step being solved
-  const Node* from_ = nullptr;
-  const VectorXd* tau_ = nullptr;
+  const Node<G>* from_ = nullptr;
+  const Load<G>* load_ = nullptr;
   double h_ = 0;
-  const LinkPoses* poses_ = nullptr;  ///< where factor_ was made
-  const JointFactors* factor_ = nullptr;
+  const Frames<G>* frames_ = nullptr;  ///< where factor_ was made
+  const Factors<G>* factor_ = nullptr;
   // scratch
   VectorXd d_, r_, p_next_, extra_, u_;
-  LinkPoses X_, X_factor_;
-  JointFactors own_factor_;
-  std::vector<rbd::Half6<double>> V_, momentum_, H_;
-  std::vector<rbd::Vec3<double>> g_, moment_;
+  Frames<G> X_, X_factor_;
+  Factors<G> own_factor_;
+  Motions<G> V_, momentum_, H_;
+  std::vector<typename G::template Direction<double>> g_, moment_;
+  Push<G> push_;
   // Newton: the factorisation serves while it converges fast
-  ChainNewton newton_;
+  ChainNewton<G> newton_;
   double relative_ = 0, relative_at_correction_ = 0;
   bool linearised_ = false;
 };
+
+template <>
+JointRow<SE3> MidpointStep<SE3>::row(int i, double d) const noexcept;
+template <>
+JointRow<SE2> MidpointStep<SE2>::row(int i, double d) const noexcept;
 
 }  // namespace hamel::dynamics

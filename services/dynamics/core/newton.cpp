@@ -54,20 +54,65 @@ void subtract_outer(Nine2& P, double s, const Nine& v, const Nine& u) {
   }
 }
 
+/// Adds the link's own inertia to what it carries.
+void add(Nine2& P, const JointRow<SE3>& row) {
+  for (int r = 0; r < 2; ++r) {
+    for (int c = 0; c < 2; ++c) P.B[r][c] += row.K[r][c];
+  }
+}
+
+// ---- the same in the plane, where a frame differs from its parent's by a translation
+
+using Change = JointRow<SE2>::Change;
+using Carried = JointRow<SE2>::Carried;
+using Planar = JointRow<SE2>::Matrix;
+using PlanarPose = rbd::PlanarFrame<double>;
+
+Change to_child(const PlanarPose& X, const Change& S) {
+  return {S[0], S[1] - S[0] * X.p.y, S[2] + S[0] * X.p.x, S[3]};
+}
+Carried to_parent(const PlanarPose& X, Carried Z) {
+  Z[0] += X.p.x * Z[2] - X.p.y * Z[1];
+  return Z;
+}
+Planar to_parent(const PlanarPose& X, Planar P) {
+  P.col(0) += X.p.x * P.col(2) - X.p.y * P.col(1);
+  P.row(0) += X.p.x * P.row(2) - X.p.y * P.row(1);
+  return P;
+}
+Carried times(const Planar& P, const Change& x) { return P * x; }
+Change transpose_times(const Planar& P, const Carried& x) { return P.transpose() * x; }
+void subtract_outer(Planar& P, double s, const Carried& v, const Change& u) {
+  P.noalias() -= s * v * u.transpose();
+}
+void add(Planar& P, const JointRow<SE2>& row) { P.topLeftCorner<3, 3>() += row.K; }
+template <int N>
+double dot(const Eigen::Matrix<double, N, 1>& x, const Eigen::Matrix<double, N, 1>& y) {
+  return x.dot(y);
+}
+void clear(Planar& P) { P.setZero(); }
+void clear(Nine2& P) { P = {}; }
+template <int N>
+void clear(Eigen::Matrix<double, N, 1>& x) {
+  x.setZero();
+}
+void clear(Nine& x) { x = {}; }
+
 }  // namespace
 
-ChainNewton::ChainNewton(const rbd::AxisChain& chain)
+template <class G>
+ChainNewton<G>::ChainNewton(const typename G::Chain& chain)
     : chain_(chain), rows_(at(chain.n())), factor_(at(chain.n())), X_(at(chain.n())), y_(at(chain.n())) {}
 
-void ChainNewton::factorise(const std::vector<Pose>& X) noexcept {
+template <class G>
+void ChainNewton<G>::factorise(const std::vector<typename G::template Frame<double>>& X) noexcept {
   std::copy(X.begin(), X.end(), X_.begin());
-  Nine2 P{};
+  typename Row::Matrix P;
+  clear(P);
   for (int i = chain_.n(); i-- > 0;) {
-    const JointRow& row = rows_[at(i)];
-    for (int r = 0; r < 2; ++r) {
-      for (int c = 0; c < 2; ++c) P.B[r][c] += row.K[r][c];
-    }
-    Factor& f = factor_[at(i)];
+    const Row& row = rows_[at(i)];
+    add(P, row);
+    JointFactor& f = factor_[at(i)];
     f.u = transpose_times(P, row.l) + row.k;
     f.v = times(P, row.b) - row.e;
     f.D_inv = 1 / (dot(f.u, row.b) + row.c);
@@ -77,20 +122,26 @@ void ChainNewton::factorise(const std::vector<Pose>& X) noexcept {
   }
 }
 
-void ChainNewton::solve(const double* r, double* x) noexcept {
-  Nine z{};
+template <class G>
+void ChainNewton<G>::solve(const double* r, double* x) noexcept {
+  typename Row::Carried z;
+  clear(z);
   for (int i = chain_.n(); i-- > 0;) {
-    const Factor& f = factor_[at(i)];
+    const JointFactor& f = factor_[at(i)];
     y_[at(i)] = (r[i] - dot(rows_[at(i)].l, z)) * f.D_inv;
-    if (i > 0) z = to_parent(X_[at(i)], z + y_[at(i)] * f.v);
+    if (i > 0) z = to_parent(X_[at(i)], typename Row::Carried(z + y_[at(i)] * f.v));
   }
-  Nine S{};
+  typename Row::Change S;
+  clear(S);
   for (int i = 0; i < chain_.n(); ++i) {
-    const Factor& f = factor_[at(i)];
+    const JointFactor& f = factor_[at(i)];
     if (i > 0) S = to_child(X_[at(i)], S);
     x[i] = y_[at(i)] - f.D_inv * dot(f.u, S);
     S = S + x[i] * rows_[at(i)].b;
   }
 }
+
+template class ChainNewton<SE3>;
+template class ChainNewton<SE2>;
 
 }  // namespace hamel::dynamics

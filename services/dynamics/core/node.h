@@ -9,33 +9,41 @@
 namespace hamel::dynamics {
 
 using Eigen::VectorXd;
-using LinkPoses = std::vector<rbd::LinkPose<double>>;
-using JointFactors = std::vector<rbd::JointFactor<double>>;
+using rbd::SE2;
+using rbd::SE3;
+template <class G>
+using Frames = std::vector<typename G::template Frame<double>>;
+template <class G>
+using Motions = std::vector<typename G::template Motion<double>>;
+template <class G>
+using Factors = std::vector<rbd::Factor<G, double>>;
 
 /// Configuration, momentum and velocity with the mass matrix factorised there.  place() first, then one of
 /// the others.  Assignments keep the sizes of the constructor: nothing allocates.
+template <class G>
 struct Node {
-  explicit Node(const rbd::AxisChain& chain);
+  using Chain = typename G::Chain;
+  explicit Node(const Chain& chain);
 
-  /// Poses, factorisation of M(q) and potential energy at q.
-  void place(const rbd::AxisChain& chain, const VectorXd& q_new) noexcept;
+  /// Frames, factorisation of M(q) and potential energy at q.
+  void place(const Chain& chain, const VectorXd& q_new) noexcept;
   /// qd = M^-1 p and the energy.
-  void move_with_momentum(const rbd::AxisChain& chain, const VectorXd& p_new) noexcept;
+  void move_with_momentum(const Chain& chain, const VectorXd& p_new) noexcept;
   /// p = M qd and the energy.
-  void move_with_velocity(const rbd::AxisChain& chain, const VectorXd& qd_new) noexcept;
+  void move_with_velocity(const Chain& chain, const VectorXd& qd_new) noexcept;
   /// True when every number of the state is finite.
   bool finite() const noexcept;
 
   VectorXd q, p, qd;
   std::vector<double> history;  ///< the tier's own
-  LinkPoses X;
-  JointFactors factor;     ///< of M(q), armature included
+  Frames<G> X;
+  Factors<G> factor;       ///< of M(q), armature included
   double potential_J = 0;  ///< U(q)
   double energy_J = 0;     ///< E = p . qd / 2 + U
 
  private:
   VectorXd scratch_;
-  std::vector<rbd::Half6<double>> momentum_;
+  Motions<G> momentum_;
 };
 
 }  // namespace hamel::dynamics

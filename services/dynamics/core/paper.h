@@ -18,12 +18,14 @@
 
 namespace hamel::dynamics {
 
-class PaperStep final : public TierStep {
+template <class G>
+class PaperStep final : public TierStep<G> {
  public:
-  PaperStep(const rbd::AxisChain& chain, const Options& options);
+  using Chain = typename G::Chain;
+  PaperStep(const Chain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
   double turn_bound() const noexcept override { return kTurnBound; }
-  StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept override;
+  StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
   Residual evaluate(const VectorXd& d) noexcept;
   void correct(VectorXd& d) noexcept;
@@ -31,17 +33,18 @@ class PaperStep final : public TierStep {
  private:
   void linearise() noexcept;
   double force(int i, double d) const noexcept;
-  void gather(const Node& node, double share, double sign, VectorXd& p) noexcept;
+  void gather(const Node<G>& node, double share, double sign, VectorXd& p) noexcept;
 
-  const rbd::AxisChain& chain_;
+  const Chain& chain_;
   const Options options_;
   IncrementHistory history_;
-  const Node* from_ = nullptr;
-  const VectorXd* tau_ = nullptr;
+  const Node<G>* from_ = nullptr;
+  const Load<G>* load_ = nullptr;
   double h_ = 0;
   VectorXd d_, r_, p_, u_;
-  std::vector<rbd::Half6<double>> V_, momentum_;
-  ChainNewton newton_;
+  Motions<G> V_, momentum_;
+  Push<G> push_;
+  ChainNewton<G> newton_;
 };
 
 }  // namespace hamel::dynamics

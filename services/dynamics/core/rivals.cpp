@@ -2,62 +2,71 @@
 
 namespace hamel::dynamics {
 
-Field::Field(const model::Chain& chain, const rbd::AxisChain& axis, double stop_stiffness)
+template <class G>
+Field<G>::Field(const typename G::Chain& chain, double stop_stiffness)
     : chain_(chain),
-      axis_(axis),
       stop_stiffness_(stop_stiffness),
-      ws_(chain),
+      sweep_(chain.n()),
+      push_(chain.n()),
       tau_(VectorXd::Zero(chain.n())) {}
 
-double Field::operator()(const VectorXd& q, const VectorXd& qd, const VectorXd& tau, VectorXd& qdd) noexcept {
+template <class G>
+double Field<G>::operator()(const VectorXd& q, const VectorXd& qd, const Load<G>& load,
+                            VectorXd& qdd) noexcept {
+  if (load.pushed) rbd::place(chain_, q.data(), sweep_.X.data());
+  push_.evaluate(chain_, sweep_.X, load);
   double power = 0;
-  for (int i = 0; i < axis_.n(); ++i) {
-    tau_[i] = tau[i] + (stop_stiffness_ > 0 ? stop_torque(axis_[i], stop_stiffness_, q[i]) : 0);
-    power += (tau_[i] - axis_[i].damping * qd[i]) * qd[i];
+  for (int i = 0; i < chain_.n(); ++i) {
+    tau_[i] =
+        load.tau[i] + push_[i] + (stop_stiffness_ > 0 ? stop_torque(chain_[i], stop_stiffness_, q[i]) : 0);
+    power += (tau_[i] - chain_[i].damping * qd[i]) * qd[i];
   }
-  rbd::forward_dynamics(chain_, q, qd, tau_, ws_, qdd);
+  rbd::forward_dynamics(chain_, q.data(), qd.data(), tau_.data(), sweep_, qdd.data());
   return power;
 }
 
-SemiImplicitEulerStep::SemiImplicitEulerStep(const model::Chain& chain, const rbd::AxisChain& axis,
-                                             const Options& options)
-    : axis_(axis),
-      field_(chain, axis, options.stop_stiffness),
+template <class G>
+SemiImplicitEulerStep<G>::SemiImplicitEulerStep(const typename G::Chain& chain, const Options& options)
+    : chain_(chain),
+      field_(chain, options.stop_stiffness),
       q_(VectorXd::Zero(chain.n())),
       qd_(q_),
       qdd_(q_) {}
 
-StepReport SemiImplicitEulerStep::advance(const Node& from, const VectorXd& tau, double h,
-                                          Node& to) noexcept {
+template <class G>
+StepReport SemiImplicitEulerStep<G>::advance(const Node<G>& from, const Load<G>& load, double h,
+                                             Node<G>& to) noexcept {
   StepReport report;
-  const double power = field_(from.q, from.qd, tau, qdd_);
+  const double power = field_(from.q, from.qd, load, qdd_);
   qd_ = from.qd + h * qdd_;
   q_ = from.q + h * qd_;
   // the torques that acted, over the way that was made
-  report.work_J = h * (power + h * tau.dot(qdd_));
-  to.place(axis_, q_);
-  to.move_with_velocity(axis_, qd_);
+  report.work_J = h * (power + h * field_.torque().dot(qdd_));
+  to.place(chain_, q_);
+  to.move_with_velocity(chain_, qd_);
   report.stop = Stop::explicit_step;
   report.evaluations = 1;
   return report;
 }
 
-Rk4Step::Rk4Step(const model::Chain& chain, const rbd::AxisChain& axis, const Options& options)
-    : axis_(axis),
-      field_(chain, axis, options.stop_stiffness),
+template <class G>
+Rk4Step<G>::Rk4Step(const typename G::Chain& chain, const Options& options)
+    : chain_(chain),
+      field_(chain, options.stop_stiffness),
       q_(VectorXd::Zero(chain.n())),
       qd_(q_),
       qdd_(q_),
       sum_q_(q_),
       sum_qd_(q_) {}
 
-StepReport Rk4Step::advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept {
+template <class G>
+StepReport Rk4Step<G>::advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept {
   constexpr double kNode[] = {0.5, 0.5, 1, 0}, kWeight[] = {1. / 6, 1. / 3, 1. / 3, 1. / 6};
   StepReport report;
   q_ = from.q, qd_ = from.qd;
   sum_q_.setZero(), sum_qd_.setZero();
   for (int s = 0; s < 4; ++s) {
-    report.work_J += h * kWeight[s] * field_(q_, qd_, tau, qdd_);
+    report.work_J += h * kWeight[s] * field_(q_, qd_, load, qdd_);
     sum_q_ += kWeight[s] * qd_;
     sum_qd_ += kWeight[s] * qdd_;
     q_ = from.q + kNode[s] * h * qd_;
@@ -65,11 +74,18 @@ StepReport Rk4Step::advance(const Node& from, const VectorXd& tau, double h, Nod
   }
   q_ = from.q + h * sum_q_;
   qd_ = from.qd + h * sum_qd_;
-  to.place(axis_, q_);
-  to.move_with_velocity(axis_, qd_);
+  to.place(chain_, q_);
+  to.move_with_velocity(chain_, qd_);
   report.stop = Stop::explicit_step;
   report.evaluations = 4;
   return report;
 }
+
+template class Field<SE3>;
+template class Field<SE2>;
+template class SemiImplicitEulerStep<SE3>;
+template class SemiImplicitEulerStep<SE2>;
+template class Rk4Step<SE3>;
+template class Rk4Step<SE2>;
 
 }  // namespace hamel::dynamics

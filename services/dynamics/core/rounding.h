@@ -1,7 +1,7 @@
 #pragma once
-/// How large the parts are that a discrete momentum is summed from: a residual is rounding, not error, when it is
-/// small against them.  The sum itself is no measure: it vanishes where the parts cancel, as at a joint that
-/// carries no torque when an arm is set in motion from rest.
+/// How large the parts are that a discrete momentum is summed from: a residual is rounding, not error, when
+/// it is small against them.  The sum itself is no measure: it vanishes where the parts cancel, as at a joint
+/// that carries no torque when an arm is set in motion from rest.
 
 #include <algorithm>
 #include <cmath>
@@ -10,24 +10,32 @@
 
 namespace hamel::dynamics {
 
-/// A momentum [kg m^2/s] or energy [J] that is nothing: an arm that comes to rest under a brake passes through it on
-/// its way to the denormal numbers, where no relative measure holds.
+/// A momentum [kg m^2/s] or energy [J] that is nothing: an arm that comes to rest under a brake passes
+/// through it on its way to the denormal numbers, where no relative measure holds.
 inline constexpr double kNothing = 1e-120;
 
 inline double norm1(const lie::Vec3<double>& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+inline double norm1(const lie::Vec2<double>& v) { return std::abs(v.x) + std::abs(v.y); }
+inline double norm1(double v) { return std::abs(v); }
+inline double largest(const lie::Sym3<double>& I) { return std::max({I.xx, I.yy, I.zz}); }
+inline double largest(double I) { return I; }
 
 /// Bounds of the angular and linear parts of a composite momentum, gathered from the tip as the momentum is.
 struct MomentumParts {
-  double angular = 0, linear = 0;   ///< [kg m^2/s], [kg m/s]
+  double angular = 0, linear = 0;  ///< [kg m^2/s], [kg m/s]
   /// Adds a link that moves with twist V.
-  void add(const rbd::AxisLink& k, const rbd::Half6<double>& V) {
+  template <class Link, class Motion>
+  void add(const Link& k, const Motion& V) {
     const double w = norm1(V.a), v = norm1(V.l), moment = norm1(k.h);
-    angular += std::max({k.I_o.xx, k.I_o.yy, k.I_o.zz}) * w + moment * v;
+    angular += largest(k.I_o) * w + moment * v;
     linear += k.mass * v + moment * w;
   }
   /// Moves the point of reference by p.
-  void shift(const lie::Vec3<double>& p) { angular += norm1(p) * linear; }
-  double along(const rbd::AxisLink& k) const { return k.prismatic ? linear : angular; }
+  template <class Vector>
+  void shift(const Vector& p) {
+    angular += norm1(p) * linear;
+  }
+  double along(const rbd::JointNumbers& k) const { return k.prismatic ? linear : angular; }
 };
 
 }  // namespace hamel::dynamics

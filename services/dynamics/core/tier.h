@@ -9,7 +9,39 @@
 
 namespace hamel::dynamics {
 
+/// What acts on the arm over one step, constant in it.
+template <class G>
+struct Load {
+  explicit Load(int n) : tau(VectorXd::Zero(n)), wrench(static_cast<std::size_t>(n)) {}
+  VectorXd tau;         ///< joint torques
+  Motions<G> wrench;    ///< on each link at its origin, in world axes (SE(2): the plane's)
+  bool pushed = false;  ///< any wrench is not zero
+};
+
+/// Joint torques of a load's wrenches at one configuration; zero where there are none.
+template <class G>
+class Push {
+ public:
+  explicit Push(int n) : Q_(VectorXd::Zero(n)), R_(static_cast<std::size_t>(n)) {}
+  void evaluate(const typename G::Chain& chain, const Frames<G>& X, const Load<G>& load) noexcept {
+    if (load.pushed) {
+      rbd::wrench_torques<G, double>(chain, X.data(), load.wrench.data(), R_.data(), Q_.data());
+      acted_ = true;
+    } else if (acted_) {
+      Q_.setZero();
+      acted_ = false;
+    }
+  }
+  double operator[](int i) const noexcept { return Q_[i]; }
+
+ private:
+  VectorXd Q_;
+  std::vector<typename G::template Attitude<double>> R_;
+  bool acted_ = false;
+};
+
 /// One way to take a step.  All memory is taken in the constructor.
+template <class G>
 class TierStep {
  public:
   virtual ~TierStep() = default;
@@ -17,16 +49,18 @@ class TierStep {
   virtual std::size_t history_size() const noexcept = 0;
   /// Which of p and qd the tier integrates: the other follows.
   virtual bool integrates_velocity() const noexcept { return false; }
+  /// True when the tier promises to keep energy: then what it makes up is held against it over all its steps.
+  virtual bool keeps_energy() const noexcept { return false; }
   /// A revolute joint may turn this much further in one undivided step than its velocity says: beyond it a
   /// low-order step is too long for the motion or its root is spurious [rad].
   virtual double turn_bound() const noexcept { return std::numeric_limits<double>::infinity(); }
   /// One undivided step of h seconds, `from` to `to`, history included.  `to` means nothing when not
   /// usable().
-  virtual StepReport advance(const Node& from, const VectorXd& tau, double h, Node& to) noexcept = 0;
+  virtual StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept = 0;
 };
 
 /// Torque of the smooth hard stops: nothing inside the limits, stiffness times excess outside [N m or N].
-inline double stop_torque(const rbd::AxisLink& k, double stiffness, double q) noexcept {
+inline double stop_torque(const rbd::JointNumbers& k, double stiffness, double q) noexcept {
   if (q > k.upper) return stiffness * (k.upper - q);
   if (q < k.lower) return stiffness * (k.lower - q);
   return 0;

@@ -1,0 +1,161 @@
+#include "services/dynamics/core/marcher.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "services/dynamics/core/rounding.h"
+
+namespace hamel::dynamics {
+namespace {
+
+/// Energy that one undivided step may gain or lose beyond the work done, as a share of the energy in play.
+constexpr double kEnergyBound = 0.1;
+/// The same over all steps: up to kDrift nobody asks; then a part may add kTrickle at most, and up to
+/// kDriftLimit.
+constexpr double kDrift = 0.25, kDriftLimit = 0.5, kTrickle = 1e-3;
+
+}  // namespace
+
+template <class G>
+Marcher<G>::Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier)
+    : chain_(chain), options_(options), tier_(std::move(tier)), now_(chain), next_(chain) {
+  now_.history.assign(tier_->history_size(), 0);
+  next_.history = now_.history;
+}
+
+template <class G>
+State Marcher<G>::start(const VectorXd& q0, const VectorXd& qd0) const {
+  Node<G> node(chain_);
+  node.place(chain_, q0);
+  node.move_with_velocity(chain_, qd0);
+  if (!tier_->integrates_velocity()) {
+    const VectorXd p = node.p;
+    node.move_with_momentum(chain_, p);
+  }
+  return {0, node.q, node.p, node.qd, std::vector<double>(now_.history.size() + Ledger::kSize, 0)};
+}
+
+template <class G>
+bool Marcher<G>::acceptable(const State& s) const noexcept {
+  const auto n = chain_.n();
+  return s.q.size() == n && s.p.size() == n && s.qd.size() == n &&
+         s.history.size() == now_.history.size() + Ledger::kSize && s.q.allFinite() && s.p.allFinite() &&
+         s.qd.allFinite() &&
+         std::all_of(s.history.begin(), s.history.end(), [](double x) { return std::isfinite(x); });
+}
+
+/// Makes `now` the node of `s`.  A node computed by the last step is kept: place() and move_...() are
+/// functions of what State holds, so a state that was saved and loaded gives the same bits.
+template <class G>
+void Marcher<G>::load_state(const State& s) noexcept {
+  const std::size_t own = now_.history.size();
+  std::copy_n(s.history.begin(), own, now_.history.begin());
+  ledger_ = {s.history[own], s.history[own + 1]};
+  if (loaded_ && now_.q == s.q && now_.p == s.p && now_.qd == s.qd) return;
+  now_.place(chain_, s.q);
+  if (tier_->integrates_velocity()) {
+    now_.move_with_velocity(chain_, s.qd);
+  } else {
+    now_.move_with_momentum(chain_, s.p);
+  }
+  loaded_ = true;
+}
+
+template <class G>
+void Marcher<G>::store(State& s) const noexcept {
+  s.q = now_.q, s.p = now_.p, s.qd = now_.qd;
+  std::copy(now_.history.begin(), now_.history.end(), s.history.begin());
+  s.history[now_.history.size()] = ledger_.made_up;
+  s.history[now_.history.size() + 1] = ledger_.exchanged;
+  ++s.step;
+}
+
+/// Guards against divergence, against spurious roots, of which the implicit equations have many at large h,
+/// and against drift.
+template <class G>
+bool Marcher<G>::sane(const StepReport& report, const Load<G>& load, double h) const noexcept {
+  if (!next_.finite()) return false;
+  double work = std::abs(report.work_J);
+  for (int i = 0; i < chain_.n(); ++i) {
+    const double d = next_.q[i] - now_.q[i];
+    if (!chain_[i].prismatic && std::abs(d - h * now_.qd[i]) > tier_->turn_bound()) return false;
+    work += std::abs(load.tau[i] * d);
+  }
+  const double in_play = now_.energy_J - now_.potential_J + work + chain_.energy_scale + kNothing;
+  const double made_up = next_.energy_J - now_.energy_J - report.work_J;
+  return std::abs(made_up) <= kEnergyBound * in_play && (!tier_->keeps_energy() || allowed(made_up, in_play));
+}
+
+/// What the ledger says to a part that makes up so much.
+template <class G>
+bool Marcher<G>::allowed(double made_up, double in_play) const noexcept {
+  const double before = std::abs(ledger_.made_up), after = std::abs(ledger_.made_up + made_up);
+  const double measure = in_play + ledger_.exchanged;
+  return after <= kDrift * measure || after <= before ||
+         (std::abs(made_up) <= kTrickle * in_play && after <= kDriftLimit * measure);
+}
+
+/// One undivided step from `now` to `next`.
+template <class G>
+StepReport Marcher<G>::advance(const Load<G>& load, double h) noexcept {
+  StepReport report = tier_->advance(now_, load, h, next_);
+  if (report.usable() && !sane(report, load, h)) report.stop = Stop::diverged;
+  return report;
+}
+
+/// The whole step; parts that fail are halved, up to max_subdivisions times.  Leaves `now` at the end, or
+/// anywhere on the way when it fails.
+template <class G>
+StepReport Marcher<G>::march(const Load<G>& load) noexcept {
+  StepReport total;
+  total.substeps = 0;
+  const std::uint64_t whole = std::uint64_t{1} << options_.max_subdivisions;
+  std::uint64_t part = whole, done = 0;  // in units of the smallest part
+  while (done < whole) {
+    const double h = options_.dt_s * (static_cast<double>(part) / static_cast<double>(whole));
+    const StepReport r = advance(load, h);
+    total.iterations += r.iterations;
+    total.evaluations += r.evaluations;
+    if (!r.usable()) {
+      total.stop = r.stop;
+      if (part == 1) {
+        total.residual_Nm = r.residual_Nm;
+        return total;
+      }
+      part /= 2;
+      continue;
+    }
+    const double made_up = next_.energy_J - now_.energy_J - r.work_J;
+    total.residual_Nm = std::max(total.residual_Nm, r.residual_Nm);
+    total.work_J += r.work_J;
+    total.energy_error_J += made_up;
+    ledger_.made_up += made_up;
+    ledger_.exchanged += std::abs(r.work_J);
+    // stagnation in one part is told of the whole
+    total.stop = total.substeps > 0 && total.stop == Stop::stagnated ? Stop::stagnated : r.stop;
+    ++total.substeps;
+    std::swap(now_, next_);
+    done += part;
+  }
+  return total;
+}
+
+template <class G>
+StepReport Marcher<G>::step(State& s, const Load<G>& load) noexcept {
+  load_state(s);
+  const StepReport report = march(load);
+  if (report.usable()) store(s);
+  return report;
+}
+
+template <class G>
+double Marcher<G>::energy(const State& s) noexcept {
+  load_state(s);
+  return now_.energy_J;
+}
+
+template class Marcher<SE3>;
+template class Marcher<SE2>;
+
+}  // namespace hamel::dynamics

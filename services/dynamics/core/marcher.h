@@ -1,0 +1,46 @@
+#pragma once
+/// A whole step of an arm by one tier: guards, energy ledger, division of steps that fail.
+
+#include <memory>
+
+#include "services/dynamics/core/tier.h"
+
+namespace hamel::dynamics {
+
+/// What a tier made up in all its steps, and the work that was exchanged meanwhile [J].  Kept at the end of a
+/// state's history.
+struct Ledger {
+  static constexpr std::size_t kSize = 2;
+  double made_up = 0, exchanged = 0;
+};
+
+template <class G>
+class Marcher {
+ public:
+  using Chain = typename G::Chain;
+  Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier);
+
+  State start(const VectorXd& q0, const VectorXd& qd0) const;
+  /// Sizes fit and every number is finite: what comes from outside is not trusted.
+  bool acceptable(const State& s) const noexcept;
+  /// Integrator::step() for an acceptable state.
+  StepReport step(State& s, const Load<G>& load) noexcept;
+  double energy(const State& s) noexcept;
+
+ private:
+  void load_state(const State& s) noexcept;
+  void store(State& s) const noexcept;
+  bool sane(const StepReport& report, const Load<G>& load, double h) const noexcept;
+  bool allowed(double made_up, double in_play) const noexcept;
+  StepReport advance(const Load<G>& load, double h) noexcept;
+  StepReport march(const Load<G>& load) noexcept;
+
+  const Chain& chain_;
+  const Options& options_;
+  std::unique_ptr<TierStep<G>> tier_;
+  Node<G> now_, next_;
+  Ledger ledger_;
+  bool loaded_ = false;
+};
+
+}  // namespace hamel::dynamics
