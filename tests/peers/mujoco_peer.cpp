@@ -13,7 +13,7 @@ namespace hamel::peers {
 
 namespace {
 
-constexpr int kDepth = 200;  // bodies nested in one file: its XML reader goes down to 500 elements
+constexpr int kDepth = 80;  // bodies nested in one file: its XML reader goes down to 100 elements
 
 std::string text(double v) {
   char out[32];

@@ -77,12 +77,15 @@ class Simbody final : public Peer {
     set(q, qd);
     torques_.setAllMobilityForces(state_, none_);
     state_.setTime(0);
-    dt_s_ = dt_s, steps_ = 0;
     integrator_ = std::make_unique<SimTK::VerletIntegrator>(system_, dt_s);
     integrator_->setProjectEveryStep(false);
+    integrator_->setReturnEveryInternalStep(true);
     integrator_->initialize(state_);
   }
-  void step() override { integrator_->stepTo(dt_s_ * ++steps_); }
+  void step() override {
+    while (integrator_->stepTo(SimTK::Infinity) != SimTK::Integrator::TimeHasAdvanced) {
+    }
+  }
 
  private:
   SimTK::MobilizedBody add(SimTK::MobilizedBody& parent, const model::Chain& chain, int i) {
@@ -105,8 +108,6 @@ class Simbody final : public Peer {
   SimTK::State state_;
   SimTK::Vector none_, udot_, residual_;
   std::unique_ptr<SimTK::VerletIntegrator> integrator_;
-  double dt_s_ = 0;
-  int steps_ = 0;
 };
 
 }  // namespace
