@@ -23,8 +23,8 @@ int up(const RunArgs& args);
 struct GoalArgs {
   runtime::BusOptions bus;
   std::uint32_t arm = 1;
-  std::vector<double> position_m;    ///< 3, or
-  std::vector<double> pose;          ///< 7: position, quaternion x y z w, or
+  std::vector<double> position_m;  ///< 3, or
+  std::vector<double> pose;        ///< 7: position, quaternion x y z w, or
   std::vector<double> joints;
 };
 int goal(const GoalArgs& args);
@@ -32,7 +32,7 @@ int goal(const GoalArgs& args);
 struct ModeArgs {
   runtime::BusOptions bus;
   std::uint32_t arm = 1;
-  std::string mode;                  ///< stop, hold, resume, clear-fault
+  std::string mode;  ///< stop, hold, resume, clear-fault
 };
 int mode(const ModeArgs& args);
 

@@ -13,8 +13,8 @@ std::optional<Problem> check_picture_name(const std::string& path) {
 
 std::string terminal(const std::string& path, int width, int height) {
   const bool png = path.ends_with(".png");
-  return fmt::format("set terminal {} noenhanced size {},{} {}\nset output '{}'\n", png ? "pngcairo" : "svg", width,
-                     height, png ? "" : "background 'white'", path);
+  return fmt::format("set terminal {} noenhanced size {},{} {}\nset output '{}'\n", png ? "pngcairo" : "svg",
+                     width, height, png ? "" : "background 'white'", path);
 }
 
 std::optional<Problem> draw(const std::string& script, const std::string& path) {

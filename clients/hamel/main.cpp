@@ -18,8 +18,10 @@ void add_run_like(CLI::App& app, client::RunArgs& a) {
   app.add_option("--csv", a.csv_path,
                  "write every step: t_s, q, qd, tau, end effector, clearance, energy, iterations")
       ->type_name("FILE");
-  app.add_option("--record", a.record_path, "keep every message of the run in this file (MCAP)")->type_name("FILE");
-  app.add_option("--compression", a.compression, "of the recording: none, lz4 or zstd")->capture_default_str();
+  app.add_option("--record", a.record_path, "keep every message of the run in this file (MCAP)")
+      ->type_name("FILE");
+  app.add_option("--compression", a.compression, "of the recording: none, lz4 or zstd")
+      ->capture_default_str();
 }
 
 /// record and log: their options, and what to do when they were asked for.
@@ -28,10 +30,15 @@ class RecordVerbs {
   explicit RecordVerbs(CLI::App& app) {
     record_ = app.add_subcommand("record", "keep every message of the bus in a file (MCAP) until Ctrl-C");
     record_->add_option("-o,--output", record_args_.path, "recording")->required()->type_name("FILE");
-    record_->add_option("--compression", record_args_.compression, "none, lz4 or zstd")->capture_default_str();
-    record_->add_option("--duration", record_args_.duration_s, "end after so many seconds")->check(CLI::PositiveNumber);
-    record_->add_option("--scene", record_args_.scene_path, "scene of the run, kept in the recording for replays");
-    record_->add_option("--set", record_args_.overrides, "overrides of the run")->type_name("PATH=VALUE")->allow_extra_args(false);
+    record_->add_option("--compression", record_args_.compression, "none, lz4 or zstd")
+        ->capture_default_str();
+    record_->add_option("--duration", record_args_.duration_s, "end after so many seconds")
+        ->check(CLI::PositiveNumber);
+    record_->add_option("--scene", record_args_.scene_path,
+                        "scene of the run, kept in the recording for replays");
+    record_->add_option("--set", record_args_.overrides, "overrides of the run")
+        ->type_name("PATH=VALUE")
+        ->allow_extra_args(false);
     runtime::add_bus_options(*record_, record_args_.bus);
 
     log_ = app.add_subcommand("log", "look into a recording");
@@ -74,17 +81,22 @@ class RecordVerbs {
   }
 
   void add_replay(CLI::App& app) {
-    replay_ = app.add_subcommand("replay", "feed a recording to a service and compare what comes out with what was recorded");
+    replay_ = app.add_subcommand(
+        "replay", "feed a recording to a service and compare what comes out with what was recorded");
     replay_->add_option("file", replay_args_.path, "recording")->required()->type_name("FILE");
     replay_->add_option("--into", replay_args_.into, "planner or dynamics")
         ->required()
         ->check(CLI::IsMember({"planner", "dynamics"}));
     replay_->add_flag("--check", replay_args_.check, "exit code 1 where anything differs");
-    replay_->add_option("--tolerance", replay_args_.tolerances, "absolute, of one field (torque=1e-9) or of all (*=1e-12); repeat")
+    replay_
+        ->add_option("--tolerance", replay_args_.tolerances,
+                     "absolute, of one field (torque=1e-9) or of all (*=1e-12); repeat")
         ->type_name("FIELD=NUMBER")
         ->allow_extra_args(false);
     replay_->add_option("--scene", replay_args_.scene_path, "scene to use instead of the recorded one");
-    replay_->add_option("--set", replay_args_.overrides, "override a field of the scene")->type_name("PATH=VALUE")->allow_extra_args(false);
+    replay_->add_option("--set", replay_args_.overrides, "override a field of the scene")
+        ->type_name("PATH=VALUE")
+        ->allow_extra_args(false);
     replay_->add_flag("--json", replay_args_.json, "one JSON object");
   }
 

@@ -15,8 +15,8 @@ namespace hamel::client {
 using namespace std::chrono_literals;
 
 namespace {
-constexpr auto kPatience = 20s;          // nothing heard for so long: the run is lost
-constexpr auto kLastWords = 500ms;       // after the final summary, for the last report
+constexpr auto kPatience = 20s;     // nothing heard for so long: the run is lost
+constexpr auto kLastWords = 500ms;  // after the final summary, for the last report
 constexpr std::size_t kRowsWaiting = 200;
 }  // namespace
 
@@ -43,8 +43,8 @@ void CsvWriter::row(const wire::ArmState& s, const Eigen::Vector3d& tip_m, doubl
   fmt::format_to(out, "{:.9g}", s.t_s);
   for (const auto* v : {&s.position, &s.velocity, &s.torque_applied})
     for (Eigen::Index i = 0; i < v->size(); ++i) fmt::format_to(out, ",{:.17g}", (*v)[i]);
-  fmt::format_to(out, ",{:.9g},{:.9g},{:.9g},{:.9g},{:.17g},{:.17g},{},{:.3g}\n", tip_m.x(), tip_m.y(), tip_m.z(), clearance_m,
-                 s.energy_J, s.work_J, s.solver.iterations, s.solver.residual_Nm);
+  fmt::format_to(out, ",{:.9g},{:.9g},{:.9g},{:.9g},{:.17g},{:.17g},{},{:.3g}\n", tip_m.x(), tip_m.y(),
+                 tip_m.z(), clearance_m, s.energy_J, s.work_J, s.solver.iterations, s.solver.residual_Nm);
   failed_ |= std::fwrite(b.data(), 1, b.size(), file_) != b.size();
 }
 
@@ -54,7 +54,8 @@ std::optional<Problem> CsvWriter::finish() {
   return std::nullopt;
 }
 
-Monitor::Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv, bool live)
+Monitor::Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv,
+                 bool live)
     : scene_(scene),
       pace_(pace),
       state_in_(node),
@@ -100,7 +101,8 @@ bool Monitor::poll(Time now) {
 }
 
 runtime::Clock::time_point Monitor::due() const {
-  return std::min(last_shown_ + 250ms, summary_ && summary_->final_summary ? final_heard_ + kLastWords : last_shown_ + 250ms);
+  return std::min(last_shown_ + 250ms,
+                  summary_ && summary_->final_summary ? final_heard_ + kLastWords : last_shown_ + 250ms);
 }
 
 void Monitor::take_states() {
@@ -135,7 +137,8 @@ void Monitor::write_rows(bool all) {
   if (!csv_) return;
   while (!rows_.empty()) {
     const wire::ArmState& s = rows_.front();
-    const bool ready = all || !scene_.steered || (report_ && report_->step >= s.step) || rows_.size() > kRowsWaiting;
+    const bool ready =
+        all || !scene_.steered || (report_ && report_->step >= s.step) || rows_.size() > kRowsWaiting;
     if (!ready) return;
     rbd::positions(scene_.robot.chain, s.position, ws_);
     csv_->row(s, rbd::tip(scene_.robot.chain, ws_).p, report_ ? report_->clearance_m : wire::kInf);
@@ -149,8 +152,9 @@ void Monitor::show(Time now) {
   const double dt_s = std::chrono::duration<double>(now - last_shown_).count();
   if (live_ && state_) {
     const double drift = summary_ ? summary_->energy_drift_rel : 0;
-    std::string line = fmt::format("t={:.1f}s {:.2f}x dyn {:.0f}Hz", state_->t_s, (state_->t_s - shown_t_s_) / dt_s,
-                                   static_cast<double>(states_ - shown_states_) / dt_s);
+    std::string line =
+        fmt::format("t={:.1f}s {:.2f}x dyn {:.0f}Hz", state_->t_s, (state_->t_s - shown_t_s_) / dt_s,
+                    static_cast<double>(states_ - shown_states_) / dt_s);
     if (report_)
       line += fmt::format(" plan {:.0f}us {} error {:.3f}m clearance {:.3f}m", report_->cycle_time_s * 1e6,
                           wire::to_string(report_->state), report_->target_error_m, report_->clearance_m);
@@ -182,11 +186,14 @@ void judge(Outcome& o, const scene::Scene& scene, const wire::PlannerReport* las
   if (o.contacts > 0) return say("UNSAFE", wire::to_string(wire::Reason::contact), runtime::kFailed);
   const std::string reason = last->reason == wire::Reason::none ? "" : wire::to_string(last->reason);
   switch (last->state) {
-    case wire::PlannerState::reached: return say("REACHED", reason, runtime::kDone);
+    case wire::PlannerState::reached:
+      return say("REACHED", reason, runtime::kDone);
     case wire::PlannerState::stuck:
     case wire::PlannerState::unsafe:
-    case wire::PlannerState::fault: return say(wire::to_string(last->state), reason, runtime::kFailed);
-    default: return say(wire::to_string(last->state), "not_reached_in_time", runtime::kNoData);
+    case wire::PlannerState::fault:
+      return say(wire::to_string(last->state), reason, runtime::kFailed);
+    default:
+      return say(wire::to_string(last->state), "not_reached_in_time", runtime::kNoData);
   }
 }
 

@@ -16,15 +16,15 @@ namespace hamel::client {
 
 /// A run in numbers; every double may be +inf or NaN where nothing was measured.
 struct Outcome {
-  std::string outcome;               ///< DONE, REACHED, STUCK, UNSAFE, FAULT, MOVING, NO_DATA, INTERRUPTED
+  std::string outcome;  ///< DONE, REACHED, STUCK, UNSAFE, FAULT, MOVING, NO_DATA, INTERRUPTED
   std::string reason, detail;
   int exit_code = 0;
-  double time_to_goal_s = -1;        ///< < 0: not reached
+  double time_to_goal_s = -1;  ///< < 0: not reached
   double final_error_m = 0, min_clearance_m = 0, path_length_m = 0;
   std::uint32_t contacts = 0;
   wire::RunSummary summary;
   double t_s = 0, wall_s = 0;
-  std::uint64_t rows_lost = 0;       ///< states the monitor did not see
+  std::uint64_t rows_lost = 0;  ///< states the monitor did not see
 };
 
 class CsvWriter {
@@ -48,7 +48,8 @@ class CsvWriter {
 class Monitor final : public runtime::Service {
  public:
   /// `live`: a status line on stderr.  `csv` may be null.
-  Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv, bool live);
+  Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv,
+          bool live);
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   /// The run is over and its last report is here, or nothing was heard for `patience`.

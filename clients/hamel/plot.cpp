@@ -17,7 +17,7 @@ namespace hamel::client {
 
 namespace {
 
-constexpr int kSnapshots = 12;         // arms drawn along the run
+constexpr int kSnapshots = 12;  // arms drawn along the run
 constexpr std::size_t kPathPoints = 800;
 
 struct Row {
@@ -193,7 +193,8 @@ std::string script(const PlotArgs& args, const scene::Scene& scene, const std::v
     add_obstacles(s, source, rows.back().t_s, 0, views[i], fmt::format("solid{}", i));
     add_obstacles(s, source, rows.back().t_s, scene.planner.rho0_m, views[i], fmt::format("reach{}", i));
   }
-  s.add("set multiplot layout 1,{} title '{}'\nset key outside bottom center horizontal\n", views.size() + 1, scene.name);
+  s.add("set multiplot layout 1,{} title '{}'\nset key outside bottom center horizontal\n", views.size() + 1,
+        scene.name);
   for (std::size_t i = 0; i < views.size(); ++i) {
     const View& v = views[i];
     s.add("set size ratio -1\nset xlabel '{} [m]'\nset ylabel '{} [m]'\nplot ", v.label_across, v.label_up);
@@ -211,10 +212,15 @@ std::string script(const PlotArgs& args, const scene::Scene& scene, const std::v
   }
   s.add("set size noratio\nset xlabel 't [s]'\n");
   if (scene.steered)
-    s.add("set ylabel '[m]'\nset yrange [0:*]\nplot $path using 4:6 with lines lw 2 lc rgb '#228833' title 'distance to target', "
-          "$path using 4:5 with lines lw 2 lc rgb '#cc6644' title 'clearance'\n");
+    s.add(
+        "set ylabel '[m]'\nset yrange [0:*]\nplot $path using 4:6 with lines lw 2 lc rgb '#228833' title "
+        "'distance to target', "
+        "$path using 4:5 with lines lw 2 lc rgb '#cc6644' title 'clearance'\n");
   else
-    s.add("set ylabel 'energy - energy(0) [J]'\nplot $path using 4:($7-({})) with lines lc rgb '#114488' notitle\n", rows[0].energy_J);
+    s.add(
+        "set ylabel 'energy - energy(0) [J]'\nplot $path using 4:($7-({})) with lines lc rgb '#114488' "
+        "notitle\n",
+        rows[0].energy_J);
   s.add("unset multiplot\n");
   return s.str();
 }

@@ -9,8 +9,8 @@ namespace hamel::client {
 struct PlotArgs {
   std::string scene_path;
   std::vector<std::string> overrides;
-  std::string csv_path;              ///< written by --csv of the same scene
-  std::string out_path;              ///< .svg or .png
+  std::string csv_path;  ///< written by --csv of the same scene
+  std::string out_path;  ///< .svg or .png
 };
 
 int plot(const PlotArgs& args);

@@ -46,11 +46,16 @@ void print_json(const scene::Scene& scene, const Outcome& o) {
   fmt::print("{}\n", j.dump(2));
 }
 
-void print_table(const scene::Scene& scene, const Outcome& o, const std::string& pace, const std::string& bus) {
-  const auto line = [](const char* name, const std::string& value) { fmt::print("  {:<18} {}\n", name, value); };
-  const auto si = [](double v, const char* unit) { return std::isfinite(v) ? fmt::format("{:.4g} {}", v, unit) : "-"; };
-  fmt::print("{} ({}, {}, dt {} s, {}, {})\n", scene.name, scene.robot.name, scene::to_string(scene.dynamics.tier),
-             scene.dynamics.dt_s, pace, bus);
+void print_table(const scene::Scene& scene, const Outcome& o, const std::string& pace,
+                 const std::string& bus) {
+  const auto line = [](const char* name, const std::string& value) {
+    fmt::print("  {:<18} {}\n", name, value);
+  };
+  const auto si = [](double v, const char* unit) {
+    return std::isfinite(v) ? fmt::format("{:.4g} {}", v, unit) : "-";
+  };
+  fmt::print("{} ({}, {}, dt {} s, {}, {})\n", scene.name, scene.robot.name,
+             scene::to_string(scene.dynamics.tier), scene.dynamics.dt_s, pace, bus);
   line("outcome", o.outcome + (o.reason.empty() ? "" : " (" + o.reason + ")"));
   if (!o.detail.empty()) line("", o.detail);
   if (scene.steered) {
@@ -66,7 +71,8 @@ void print_table(const scene::Scene& scene, const Outcome& o, const std::string&
   line("residual max", fmt::format("{:.2e} N m", o.summary.residual_max_Nm));
   line("steps", fmt::format("{}{}", o.summary.steps,
                             o.summary.substepped ? fmt::format(" ({} divided)", o.summary.substepped) : ""));
-  line("wall time", fmt::format("{:.2f} s ({:.3g} x real time)", o.wall_s, o.wall_s > 0 ? o.t_s / o.wall_s : 0));
+  line("wall time",
+       fmt::format("{:.2f} s ({:.3g} x real time)", o.wall_s, o.wall_s > 0 ? o.t_s / o.wall_s : 0));
   if (o.summary.commands_missed || o.summary.deadlines_missed)
     line("missed", fmt::format("{} steps without a fresh command, {} deadlines", o.summary.commands_missed,
                                o.summary.deadlines_missed));

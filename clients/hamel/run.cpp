@@ -12,8 +12,8 @@ namespace hamel::client {
 
 namespace {
 
-int conclude(const scene::Scene& scene, Monitor& monitor, bool interrupted, const RunArgs& args, const std::string& pace,
-             const std::string& bus) {
+int conclude(const scene::Scene& scene, Monitor& monitor, bool interrupted, const RunArgs& args,
+             const std::string& pace, const std::string& bus) {
   const Outcome o = monitor.outcome(interrupted);
   if (args.json)
     print_json(scene, o);

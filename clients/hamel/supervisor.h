@@ -16,17 +16,17 @@ class Supervisor {
   struct Child {
     std::string name;
     std::vector<std::string> command;
-    pid_t pid = -1;                    ///< -1: not running
+    pid_t pid = -1;  ///< -1: not running
     int restarts = 0;
-    bool done = false;                 ///< ended as it should, or given up
-    int exit_code = 0;                 ///< of its last end; 128 + signal for a signal
+    bool done = false;  ///< ended as it should, or given up
+    int exit_code = 0;  ///< of its last end; 128 + signal for a signal
     Clock::time_point started{}, restart_at{};
   };
 
   ~Supervisor() { end(); }
   void add(std::string name, std::vector<std::string> command);
-  /// Starts what should run, notes what died; a child that ended with 0 is done, one with 2 (bad input) or that died
-  /// ten times within two seconds of its start is given up.  Logs each event.
+  /// Starts what should run, notes what died; a child that ended with 0 is done, one with 2 (bad input) or
+  /// that died ten times within two seconds of its start is given up.  Logs each event.
   void poll(Clock::time_point now);
   /// SIGTERM to all, SIGKILL to those that are still there after 1.5 s.
   void end();

@@ -33,8 +33,8 @@ bool wait_for(bus::Node& node, wire::Subscription<T>& sub, T& m, Wanted wanted) 
 }
 
 int nobody(const char* verb, const char* whom, const runtime::BusOptions& o) {
-  fmt::print(stderr, "hamel {}: no {} answered within {} s on domain {}{}\n", verb, whom, kPatience.count(), o.domain,
-             o.interface_name.empty() ? " (loopback)" : " (" + o.interface_name + ")");
+  fmt::print(stderr, "hamel {}: no {} answered within {} s on domain {}{}\n", verb, whom, kPatience.count(),
+             o.domain, o.interface_name.empty() ? " (loopback)" : " (" + o.interface_name + ")");
   return runtime::kNoData;
 }
 
@@ -49,9 +49,12 @@ int goal(const GoalArgs& args) {
   const auto& from = !args.pose.empty() ? args.pose : args.position_m;
   if (!args.joints.empty()) {
     if (args.joints.size() > wire::kMaxJoints)
-      return runtime::complain("hamel goal", {{"--joints", fmt::format("{} values, at most {}", args.joints.size(), wire::kMaxJoints)}});
+      return runtime::complain(
+          "hamel goal",
+          {{"--joints", fmt::format("{} values, at most {}", args.joints.size(), wire::kMaxJoints)}});
     g.kind = wire::GoalKind::joints;
-    g.joints = Eigen::Map<const Eigen::VectorXd>(args.joints.data(), static_cast<Eigen::Index>(args.joints.size()));
+    g.joints =
+        Eigen::Map<const Eigen::VectorXd>(args.joints.data(), static_cast<Eigen::Index>(args.joints.size()));
   } else {
     g.kind = args.pose.empty() ? wire::GoalKind::position : wire::GoalKind::pose;
     g.position_m = Eigen::Map<const Eigen::Vector3d>(from.data());
@@ -59,20 +62,23 @@ int goal(const GoalArgs& args) {
   if (!args.pose.empty()) {
     g.orientation_xyzw = Eigen::Map<const Eigen::Vector4d>(args.pose.data() + 3);
     const double norm = g.orientation_xyzw.norm();
-    if (!(norm > 1e-6)) return runtime::complain("hamel goal", {{"--pose", "the quaternion must not be zero"}});
+    if (!(norm > 1e-6))
+      return runtime::complain("hamel goal", {{"--pose", "the quaternion must not be zero"}});
     g.orientation_xyzw /= norm;
   }
 
   wire::Publisher<wire::Goal> out(n);
   wire::Subscription<wire::PlannerReport> reports(n);
   wire::PlannerReport r;
-  if (!wait_for(n, reports, r, [&](const auto& m) { return m.arm == args.arm; })) return nobody("goal", "planner", args.bus);
+  if (!wait_for(n, reports, r, [&](const auto& m) { return m.arm == args.arm; }))
+    return nobody("goal", "planner", args.bus);
   g.id = r.goal_id + 1;
   if (!out.publish(g)) return runtime::complain("hamel goal", {{"goal", "the bus refused it"}});
   if (!wait_for(n, reports, r, [&](const auto& m) { return m.arm == args.arm && m.goal_id >= g.id; }))
     return nobody("goal", "planner", args.bus);
   fmt::print("goal {} taken by arm {}: {}{}{}\n", r.goal_id, r.arm, wire::to_string(r.state),
-             r.reason == wire::Reason::none ? "" : std::string(" ") + wire::to_string(r.reason), r.detail.empty() ? "" : ", " + r.detail);
+             r.reason == wire::Reason::none ? "" : std::string(" ") + wire::to_string(r.reason),
+             r.detail.empty() ? "" : ", " + r.detail);
   const bool refused = r.reason == wire::Reason::unreachable || r.state == wire::PlannerState::fault;
   return refused ? runtime::kFailed : runtime::kDone;
 }
@@ -89,12 +95,14 @@ int mode(const ModeArgs& args) {
   wire::Publisher<wire::ModeCommand> out(n);
   wire::Subscription<wire::ArmState> states(n);
   wire::ArmState s;
-  if (!wait_for(n, states, s, [&](const auto& m) { return m.arm == args.arm; })) return nobody(args.mode.c_str(), "arm", args.bus);
+  if (!wait_for(n, states, s, [&](const auto& m) { return m.arm == args.arm; }))
+    return nobody(args.mode.c_str(), "arm", args.bus);
   // Mode ids only have to grow: the wall clock does, over all clients.
   const auto since = std::chrono::system_clock::now().time_since_epoch();
-  const wire::ModeCommand c{.arm = args.arm,
-                            .id = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since).count()),
-                            .mode = wanted};
+  const wire::ModeCommand c{
+      .arm = args.arm,
+      .id = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since).count()),
+      .mode = wanted};
   if (!out.publish(c)) return runtime::complain("hamel " + args.mode, {{"mode", "the bus refused it"}});
   const auto obeyed = [&](const wire::ArmState& m) {
     if (m.arm != args.arm) return false;
@@ -113,7 +121,8 @@ int status(const StatusArgs& args) {
   bus::Node& n = *node.value();
   wire::Subscription<wire::ServiceStatus> sub(n);
   std::map<std::pair<std::uint32_t, wire::ServiceKind>, wire::ServiceStatus> seen;
-  const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(args.seconds));
+  const auto deadline =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(args.seconds));
   wire::ServiceStatus s;
   do {
     while (sub.take(s)) seen[{s.arm, s.kind}] = s;
@@ -124,22 +133,31 @@ int status(const StatusArgs& args) {
     for (const auto& [key, v] : seen) {
       nlohmann::ordered_json counters = nlohmann::ordered_json::object();
       for (const auto& c : v.counters) counters[c.name] = c.value;
-      j.push_back({{"arm", v.arm}, {"service", wire::to_string(v.kind)}, {"state", wire::to_string(v.state)}, {"detail", v.detail},
-                   {"version", v.version}, {"idl_hash", v.idl_hash}, {"bus", v.bus}, {"incarnation", v.incarnation},
+      j.push_back({{"arm", v.arm},
+                   {"service", wire::to_string(v.kind)},
+                   {"state", wire::to_string(v.state)},
+                   {"detail", v.detail},
+                   {"version", v.version},
+                   {"idl_hash", v.idl_hash},
+                   {"bus", v.bus},
+                   {"incarnation", v.incarnation},
                    {"counters", counters}});
     }
     fmt::print("{}\n", nlohmann::ordered_json{{"services", j}}.dump(2));
   } else {
     for (const auto& [key, v] : seen) {
-      fmt::print("arm {} {:<11} {:<9} {:<12} {} {}\n", v.arm, wire::to_string(v.kind), wire::to_string(v.state), v.detail, v.bus, v.version);
+      fmt::print("arm {} {:<11} {:<9} {:<12} {} {}\n", v.arm, wire::to_string(v.kind),
+                 wire::to_string(v.state), v.detail, v.bus, v.version);
       std::string line;
       for (const auto& c : v.counters) line += fmt::format(" {} {}", c.name, c.value);
       fmt::print("     {}\n", line);
-      if (v.idl_hash != wire::idl_hash()) fmt::print("      other IDL: {}, ours is {}\n", v.idl_hash, wire::idl_hash());
+      if (v.idl_hash != wire::idl_hash())
+        fmt::print("      other IDL: {}, ours is {}\n", v.idl_hash, wire::idl_hash());
     }
   }
   if (seen.empty()) {
-    fmt::print(stderr, "hamel status: no service spoke within {} s on domain {}\n", args.seconds, args.bus.domain);
+    fmt::print(stderr, "hamel status: no service spoke within {} s on domain {}\n", args.seconds,
+               args.bus.domain);
     return runtime::kNoData;
   }
   return runtime::kDone;

@@ -52,8 +52,8 @@ class Children final : public runtime::Service {
   Monitor& monitor_;
 };
 
-std::vector<std::string> command(const std::string& service, const RunArgs& a, const scene::Scene& s, scene::Pace pace,
-                                 const std::string& state_dir) {
+std::vector<std::string> command(const std::string& service, const RunArgs& a, const scene::Scene& s,
+                                 scene::Pace pace, const std::string& state_dir) {
   const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   const auto beside = here / ("hamel-" + service);
   std::vector<std::string> c{beside.string(), a.run.scene_path};
@@ -81,7 +81,8 @@ int up(const RunArgs& args) {
   if (!node) return runtime::complain("hamel up", {node.error()});
   bus::Node& n = *node.value();
   if (n.options().vendor == bus::Vendor::inproc)
-    return runtime::complain("hamel up", {{"--bus inproc", "reaches one process only; use fastdds or cyclonedds, or hamel run"}});
+    return runtime::complain(
+        "hamel up", {{"--bus inproc", "reaches one process only; use fastdds or cyclonedds, or hamel run"}});
   const auto pace = runtime::pace(args.run, scene::Pace::realtime);
 
   std::unique_ptr<CsvWriter> csv;
@@ -97,7 +98,8 @@ int up(const RunArgs& args) {
     if (!f) return runtime::complain("hamel up", {f.error()});
     folder = std::move(f).value();
     state_dir = folder->path();
-  } else if (std::error_code e; !std::filesystem::is_directory(state_dir) && !std::filesystem::create_directories(state_dir, e)) {
+  } else if (std::error_code e; !std::filesystem::is_directory(state_dir) &&
+                                !std::filesystem::create_directories(state_dir, e)) {
     return runtime::complain("hamel up", {{state_dir, "cannot make the folder: " + e.message()}});
   }
 
@@ -106,7 +108,8 @@ int up(const RunArgs& args) {
   Monitor monitor(n, s, pace, std::move(csv), !args.json);
   Supervisor supervisor;
   if (s.steered)
-    for (const char* name : {"perception", "planner"}) supervisor.add(name, command(name, args, s, pace, state_dir));
+    for (const char* name : {"perception", "planner"})
+      supervisor.add(name, command(name, args, s, pace, state_dir));
   supervisor.add("dynamics", command("dynamics", args, s, pace, state_dir));
   Children children(supervisor, monitor);
   std::vector<runtime::Service*> services{&children, &monitor};

@@ -26,9 +26,9 @@ struct Obstacle {
   std::uint32_t id = 0;
   Shape shape;
   lie::Pose X_WO;
-  lie::Twist V_WO = lie::Twist::Zero();     ///< (omega, v) of the obstacle's origin, world axes [rad/s, m/s]
-  bool velocity_known = true;               ///< false: V_WO means nothing
-  double sigma_m = 0;                       ///< standard deviation of the position
+  lie::Twist V_WO = lie::Twist::Zero();  ///< (omega, v) of the obstacle's origin, world axes [rad/s, m/s]
+  bool velocity_known = true;            ///< false: V_WO means nothing
+  double sigma_m = 0;                    ///< standard deviation of the position
 };
 
 }  // namespace hamel::geometry

@@ -16,17 +16,17 @@ enum class JointKind : std::uint8_t { revolute, continuous, prismatic };
 /// Mass distribution of a link, in the axes of the link's frame.
 struct Inertia {
   double mass_kg = 0;
-  Eigen::Vector3d com_m = Eigen::Vector3d::Zero();               ///< centre of mass in the link frame
-  Eigen::Matrix3d about_com_kgm2 = Eigen::Matrix3d::Zero();      ///< about the centre of mass
+  Eigen::Vector3d com_m = Eigen::Vector3d::Zero();           ///< centre of mass in the link frame
+  Eigen::Matrix3d about_com_kgm2 = Eigen::Matrix3d::Zero();  ///< about the centre of mass
 };
 
 /// What a joint may do.  Unlimited unless said.
 struct JointLimits {
-  double lower = -std::numeric_limits<double>::infinity();         ///< [rad or m]
-  double upper = std::numeric_limits<double>::infinity();          ///< [rad or m]
-  double velocity = std::numeric_limits<double>::infinity();       ///< |qd| [rad/s or m/s]
-  double acceleration = std::numeric_limits<double>::infinity();   ///< |qdd| [rad/s^2 or m/s^2]
-  double effort = std::numeric_limits<double>::infinity();         ///< |tau| [N m or N]
+  double lower = -std::numeric_limits<double>::infinity();        ///< [rad or m]
+  double upper = std::numeric_limits<double>::infinity();         ///< [rad or m]
+  double velocity = std::numeric_limits<double>::infinity();      ///< |qd| [rad/s or m/s]
+  double acceleration = std::numeric_limits<double>::infinity();  ///< |qdd| [rad/s^2 or m/s^2]
+  double effort = std::numeric_limits<double>::infinity();        ///< |tau| [N m or N]
 };
 
 /// A one-degree-of-freedom joint between link i-1 (P, or the base) and link i (B).
@@ -34,11 +34,11 @@ struct JointLimits {
 struct Joint {
   std::string name;
   JointKind kind = JointKind::revolute;
-  lie::Pose X_PJ;                                        ///< pose of link i's frame in link i-1's at q = 0
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();       ///< unit, in link i's frame
+  lie::Pose X_PJ;                                   ///< pose of link i's frame in link i-1's at q = 0
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit, in link i's frame
   JointLimits limits;
-  double damping = 0;                                    ///< viscous, tau = -damping qd [N m s/rad or N s/m]
-  double armature = 0;                                   ///< rotor inertia about the joint [kg m^2 or kg]
+  double damping = 0;   ///< viscous, tau = -damping qd [N m s/rad or N s/m]
+  double armature = 0;  ///< rotor inertia about the joint [kg m^2 or kg]
 };
 
 /// A rigid link.  Its frame B sits on its joint.
@@ -50,12 +50,12 @@ struct Link {
 /// What a Chain is built from; freely editable, checked by build().
 struct ChainSpec {
   std::string name;
-  std::vector<Joint> joints;                             ///< from base to tip
-  std::vector<Link> links;                               ///< as many as joints
-  lie::Pose X_WB0;                                       ///< pose of the base in the world
+  std::vector<Joint> joints;  ///< from base to tip
+  std::vector<Link> links;    ///< as many as joints
+  lie::Pose X_WB0;            ///< pose of the base in the world
   Eigen::Vector3d gravity_W_mps2 = {0, 0, -9.81};
-  std::string tip_name;                                  ///< name of the end-effector frame
-  lie::Pose X_NE;                                        ///< end-effector frame E in the last link's frame
+  std::string tip_name;  ///< name of the end-effector frame
+  lie::Pose X_NE;        ///< end-effector frame E in the last link's frame
 };
 
 /// An immutable, checked chain: indices run from 0 (next to the base) to n()-1 (tip).
@@ -81,8 +81,9 @@ class Chain {
 };
 
 /// A checked chain, or every problem of the spec: sizes differ, no joint, axis not unit to 1e-9, rotation not
-/// orthonormal to 1e-9, a number not finite, mass < 0, a moving mass whose inertia is not positive definite or
-/// breaks the triangle inequality, no inertia at all on a moving link, limits crossed, damping or armature < 0.
+/// orthonormal to 1e-9, a number not finite, mass < 0, a moving mass whose inertia is not positive definite
+/// or breaks the triangle inequality, no inertia at all on a moving link, limits crossed, damping or armature
+/// < 0.
 Checked<Chain> build(ChainSpec spec);
 
 }  // namespace hamel::model

@@ -50,7 +50,8 @@ Result<std::unique_ptr<Checkpoint>, Problem> Checkpoint::open(const std::string&
   c->length_ = 2 * half;
   c->capacity_ = capacity;
   c->kind_ = kind;
-  if (ftruncate(c->fd_, static_cast<off_t>(c->length_)) != 0) return failed(path, "cannot size the checkpoint");
+  if (ftruncate(c->fd_, static_cast<off_t>(c->length_)) != 0)
+    return failed(path, "cannot size the checkpoint");
   // A mapped page that the disk cannot back kills the writer later: claim the space now.
   if (const int e = posix_fallocate(c->fd_, 0, static_cast<off_t>(c->length_)); e != 0) {
     errno = e;

@@ -12,21 +12,24 @@
 
 namespace hamel::runtime {
 
-/// Two alternating slots in one file.  A killed process (-9) loses nothing written; after a power cut the last
-/// synced slot is found, at most a second old where sync() is called each second.  Each slot carries a sequence
-/// number, its size and a CRC-32; the newest slot that is whole wins.  One writer a file (locked).
+/// Two alternating slots in one file.  A killed process (-9) loses nothing written; after a power cut the
+/// last synced slot is found, at most a second old where sync() is called each second.  Each slot carries a
+/// sequence number, its size and a CRC-32; the newest slot that is whole wins.  One writer a file (locked).
 class Checkpoint {
  public:
-  /// Opens or makes `path` for payloads up to `capacity` bytes of the format `kind` (foreign formats are refused).
+  /// Opens or makes `path` for payloads up to `capacity` bytes of the format `kind` (foreign formats are
+  /// refused).
   static Result<std::unique_ptr<Checkpoint>, Problem> open(const std::string& path, std::uint32_t kind,
                                                            std::size_t capacity);
   ~Checkpoint();
   Checkpoint(const Checkpoint&) = delete;
   Checkpoint& operator=(const Checkpoint&) = delete;
 
-  /// The newest whole payload; empty when there is none.  `note` says what was passed over and why, else empty.
+  /// The newest whole payload; empty when there is none.  `note` says what was passed over and why, else
+  /// empty.
   std::vector<std::byte> load(std::string& note) const;
-  /// Replaces the older slot.  False when the payload is larger than the capacity.  No allocation, no system call.
+  /// Replaces the older slot.  False when the payload is larger than the capacity.  No allocation, no system
+  /// call.
   bool save(std::span<const std::byte> payload) noexcept;
   /// Pushes what was saved towards the disk without waiting.
   void sync() noexcept;

@@ -23,8 +23,10 @@ void add_run_options(CLI::App& app, RunOptions& o) {
   app.add_option("--set", o.overrides, "override a field of the scene, e.g. planner.method=gyro; repeat")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
-  auto* l = app.add_flag("--lockstep", o.lockstep, "deterministic: each step waits for its command, as fast as it can");
-  auto* r = app.add_flag("--realtime", o.realtime, "paced by the clock: latest command, stale input is a named state");
+  auto* l = app.add_flag("--lockstep", o.lockstep,
+                         "deterministic: each step waits for its command, as fast as it can");
+  auto* r = app.add_flag("--realtime", o.realtime,
+                         "paced by the clock: latest command, stale input is a named state");
   l->excludes(r);
   app.add_option("--duration", o.duration_s, "seconds of simulated time instead of the scene's")
       ->check(CLI::PositiveNumber)

@@ -13,16 +13,16 @@ namespace hamel::runtime {
 
 /// Exit codes of every program here.
 enum Exit : int {
-  kDone = 0,         ///< done, or an asked-for end
-  kFailed = 1,       ///< STUCK, UNSAFE, FAULT, contact, failed check
-  kBadInput = 2,     ///< bad input or usage
-  kNoData = 3,       ///< not reached in time, no data, no peer
-  kInterrupted = 130,///< an interrupted job
+  kDone = 0,           ///< done, or an asked-for end
+  kFailed = 1,         ///< STUCK, UNSAFE, FAULT, contact, failed check
+  kBadInput = 2,       ///< bad input or usage
+  kNoData = 3,         ///< not reached in time, no data, no peer
+  kInterrupted = 130,  ///< an interrupted job
 };
 
 /// Options of the bus: which vendor, where, with whom.
 struct BusOptions {
-  std::string vendor;                      ///< empty: the program's default
+  std::string vendor;  ///< empty: the program's default
   std::uint32_t domain = bus::NodeOptions{}.domain;
   std::string interface_name;
   std::vector<std::string> peers;
@@ -32,10 +32,10 @@ struct BusOptions {
 struct RunOptions {
   BusOptions bus;
   std::string scene_path;
-  std::vector<std::string> overrides;      ///< --set path=value
-  bool lockstep = false, realtime = false; ///< at most one; neither: the program's default
-  double duration_s = -1;                  ///< < 0: the scene's, or for a lone service: until told to end
-  std::string state_dir;                   ///< checkpoints; empty: none
+  std::vector<std::string> overrides;       ///< --set path=value
+  bool lockstep = false, realtime = false;  ///< at most one; neither: the program's default
+  double duration_s = -1;                   ///< < 0: the scene's, or for a lone service: until told to end
+  std::string state_dir;                    ///< checkpoints; empty: none
   bool verbose = false;
 };
 
@@ -45,8 +45,8 @@ void add_run_options(CLI::App& app, RunOptions& o);
 /// The scene of these options, or every problem.  A --duration replaces the scene's.
 Checked<scene::Scene> load(const RunOptions& o);
 scene::Pace pace(const RunOptions& o, scene::Pace otherwise);
-/// A node of these options, or its one problem.  The vendor is the one of --bus, else the scene's for this service,
-/// else the network default.
+/// A node of these options, or its one problem.  The vendor is the one of --bus, else the scene's for this
+/// service, else the network default.
 Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const std::string& scene_vendor,
                                                       const std::string& name);
 

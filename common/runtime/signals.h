@@ -8,8 +8,8 @@
 
 namespace hamel::runtime {
 
-/// Blocks SIGINT and SIGTERM in the calling thread (and so in all it starts later) and waits for them on a thread
-/// of its own.  Make it first in main, before any middleware starts threads.
+/// Blocks SIGINT and SIGTERM in the calling thread (and so in all it starts later) and waits for them on a
+/// thread of its own.  Make it first in main, before any middleware starts threads.
 class StopSignal {
  public:
   StopSignal();

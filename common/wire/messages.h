@@ -1,9 +1,9 @@
 #pragma once
-/// The wire's types as plain structs: checked, bounded, free of any vendor.  Fields, units and frames are those of
-/// idl/hamel_v1.idl; only what differs is said here.  codec.h turns them into payloads and back.
+/// The wire's types as plain structs: checked, bounded, free of any vendor.  Fields, units and frames are
+/// those of idl/hamel_v1.idl; only what differs is said here.  codec.h turns them into payloads and back.
 ///
-/// A decoded message holds: every number finite except where the IDL says +inf, quaternions unit to 1e-6 and then
-/// normalised, enums known, equal lengths where the IDL says joints, sizes within the IDL's bounds.
+/// A decoded message holds: every number finite except where the IDL says +inf, quaternions unit to 1e-6 and
+/// then normalised, enums known, equal lengths where the IDL says joints, sizes within the IDL's bounds.
 
 #include <Eigen/Core>
 #include <array>
@@ -28,16 +28,29 @@ enum class SolverStop : std::uint32_t { converged, stagnated, budget_spent, dive
 enum class Validity : std::uint32_t { valid, command_stale, holding, stopped, diverged };
 enum class PlannerState : std::uint32_t { idle, moving, reached, stuck, unsafe, fault };
 enum class Reason : std::uint32_t {
-  none, local_minimum, joint_limit, goal_blocked, unreachable, orbit,
-  contact, stale_obstacles, stale_state, infeasible, non_finite, torque_limit,
-  driver, configuration, internal
+  none,
+  local_minimum,
+  joint_limit,
+  goal_blocked,
+  unreachable,
+  orbit,
+  contact,
+  stale_obstacles,
+  stale_state,
+  infeasible,
+  non_finite,
+  torque_limit,
+  driver,
+  configuration,
+  internal
 };
 enum class GoalKind : std::uint32_t { position, pose, joints };
 enum class Mode : std::uint32_t { stop, hold, resume, clear_fault };
 enum class ServiceState : std::uint32_t { starting, ready, degraded, stopping };
 enum class Pace : std::uint32_t { lockstep, realtime };
 
-/// "MOVING", "local_minimum", ...: the names users see (agreements: states in capitals, reasons in lower case).
+/// "MOVING", "local_minimum", ...: the names users see (agreements: states in capitals, reasons in lower
+/// case).
 const char* to_string(PlannerState v);
 const char* to_string(Reason v);
 const char* to_string(Validity v);
@@ -146,7 +159,7 @@ struct Counter {
 };
 
 struct ServiceStatus {
-  ServiceKind kind = ServiceKind::unknown;      ///< the key is arm * 16 + kind
+  ServiceKind kind = ServiceKind::unknown;  ///< the key is arm * 16 + kind
   std::uint32_t arm = 0;
   std::uint64_t incarnation = 0;
   std::string version, idl_hash, bus;

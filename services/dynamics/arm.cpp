@@ -7,7 +7,8 @@ namespace hamel::dynamics {
 
 namespace {
 
-/// Rate at which the brake takes momentum out [1/s]: rest (1 rad/s to 0.02) within 80 ms; half a step's worth at most.
+/// Rate at which the brake takes momentum out [1/s]: rest (1 rad/s to 0.02) within 80 ms; half a step's worth
+/// at most.
 double brake_rate(double dt_s) { return std::min(50.0, 0.5 / dt_s); }
 
 /// True when gravity does work on some joint: it asks for torque in one of a few configurations.
@@ -87,7 +88,8 @@ bool Arm::advance(const Drive& drive) noexcept {
   if (!report_.usable()) return false;
   books_.work_J += report_.work_J;
   books_.energy_J = integrator_.energy(state_);
-  books_.drift_J = std::max(books_.drift_J, std::abs(books_.energy_J - books_.energy_start_J - books_.work_J));
+  books_.drift_J =
+      std::max(books_.drift_J, std::abs(books_.energy_J - books_.energy_start_J - books_.work_J));
   books_.kinetic_max_J = std::max(books_.kinetic_max_J, kinetic_energy());
   books_.iterations_sum += report_.iterations;
   books_.iterations_max = std::max(books_.iterations_max, static_cast<std::uint32_t>(report_.iterations));

@@ -12,23 +12,23 @@ namespace hamel::dynamics {
 
 /// What moves the arm over one step.
 enum class DriveKind : std::uint8_t {
-  free,     ///< no torque at all
-  torque,   ///< the command's torque, gravity compensation added unless it includes it
-  brake,    ///< come to rest where it is: gravity compensation and -b p
-  hold,     ///< come to rest and keep the place where holding began
+  free,    ///< no torque at all
+  torque,  ///< the command's torque, gravity compensation added unless it includes it
+  brake,   ///< come to rest where it is: gravity compensation and -b p
+  hold,    ///< come to rest and keep the place where holding began
 };
 
 struct Drive {
   DriveKind kind = DriveKind::free;
-  const Eigen::VectorXd* torque_Nm = nullptr;   ///< kind torque: n values
+  const Eigen::VectorXd* torque_Nm = nullptr;  ///< kind torque: n values
   bool includes_gravity = false;
 };
 
 /// What a run came to so far.
 struct Books {
-  double work_J = 0;                 ///< done on the arm by torques and damping
+  double work_J = 0;  ///< done on the arm by torques and damping
   double energy_J = 0, energy_start_J = 0;
-  double drift_J = 0;                ///< largest |E - E0 - work|
+  double drift_J = 0;  ///< largest |E - E0 - work|
   double kinetic_max_J = 0;
   double iterations_sum = 0;
   std::uint64_t steps = 0, substepped = 0;
@@ -51,8 +51,8 @@ class Arm {
   const StepReport& report() const noexcept { return report_; }
   const Books& books() const noexcept { return books_; }
   const Options& options() const noexcept { return options_; }
-  /// Books::drift_J over the energy scale of the scene (agreements): sum m |g| r, or the largest kinetic energy
-  /// where gravity does nothing; 0 where nothing moved.
+  /// Books::drift_J over the energy scale of the scene (agreements): sum m |g| r, or the largest kinetic
+  /// energy where gravity does nothing; 0 where nothing moved.
   double energy_drift_rel() const noexcept;
 
   /// Continues from a saved state and its books; exact.

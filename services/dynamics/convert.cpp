@@ -6,11 +6,16 @@ namespace {
 
 wire::SolverStop to_wire(Stop s) {
   switch (s) {
-    case Stop::converged: return wire::SolverStop::converged;
-    case Stop::stagnated: return wire::SolverStop::stagnated;
-    case Stop::budget_spent: return wire::SolverStop::budget_spent;
-    case Stop::diverged: return wire::SolverStop::diverged;
-    case Stop::explicit_step: return wire::SolverStop::explicit_step;
+    case Stop::converged:
+      return wire::SolverStop::converged;
+    case Stop::stagnated:
+      return wire::SolverStop::stagnated;
+    case Stop::budget_spent:
+      return wire::SolverStop::budget_spent;
+    case Stop::diverged:
+      return wire::SolverStop::diverged;
+    case Stop::explicit_step:
+      return wire::SolverStop::explicit_step;
   }
   return wire::SolverStop::diverged;
 }

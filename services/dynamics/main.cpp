@@ -28,8 +28,11 @@ int main(int argc, char** argv) {
   runtime::linger(*node.value());
 
   switch (service.value()->outcome()) {
-    case dynamics::Outcome::no_command: return runtime::kNoData;
-    case dynamics::Outcome::diverged: return runtime::kFailed;
-    default: return runtime::kDone;
+    case dynamics::Outcome::no_command:
+      return runtime::kNoData;
+    case dynamics::Outcome::diverged:
+      return runtime::kFailed;
+    default:
+      return runtime::kDone;
   }
 }

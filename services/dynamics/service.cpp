@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t kCheckpointKind = 0x0101;  // dynamics, layout 1
 constexpr auto kRepeat = 100ms;                    // lockstep: say it again to peers that came late
-constexpr int kBurst = 64;                         // steps before the other services of the process get their turn
+constexpr int kBurst = 64;  // steps before the other services of the process get their turn
 
 runtime::Clock::duration seconds(double s) {
   return std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(s));
@@ -23,7 +23,8 @@ runtime::Clock::duration seconds(double s) {
 /// FNV-1a of what a checkpoint must agree with: the scene as it was loaded.
 std::uint64_t fingerprint(const scene::Scene& s) {
   std::uint64_t h = 1469598103934665603ull;
-  for (const char c : s.text + '\0' + s.robot.urdf) h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  for (const char c : s.text + '\0' + s.robot.urdf)
+    h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
   return h;
 }
 
@@ -38,20 +39,26 @@ std::uint64_t fresh_incarnation(scene::Pace pace) {
 
 const char* to_string(Outcome v) {
   switch (v) {
-    case Outcome::running: return "running";
-    case Outcome::done: return "done";
-    case Outcome::no_command: return "no_command";
-    case Outcome::diverged: return "diverged";
+    case Outcome::running:
+      return "running";
+    case Outcome::done:
+      return "done";
+    case Outcome::no_command:
+      return "no_command";
+    case Outcome::diverged:
+      return "diverged";
   }
   return "?";
 }
 
-Result<std::unique_ptr<DynamicsService>, Problem> DynamicsService::make(bus::Node& node, const scene::Scene& scene,
+Result<std::unique_ptr<DynamicsService>, Problem> DynamicsService::make(bus::Node& node,
+                                                                        const scene::Scene& scene,
                                                                         const ServiceConfig& config) {
   std::unique_ptr<DynamicsService> s(new DynamicsService(node, scene, config));
   if (config.state_dir.empty()) return s;
   const std::string path = config.state_dir + "/dynamics-" + std::to_string(scene.arm) + ".checkpoint";
-  auto c = runtime::Checkpoint::open(path, kCheckpointKind, 4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512);
+  auto c = runtime::Checkpoint::open(path, kCheckpointKind,
+                                     4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512);
   if (!c) return c.error();
   s->checkpoint_ = std::move(c).value();
   std::string note;
@@ -97,7 +104,8 @@ bool DynamicsService::poll(Time now) {
     d.name = scene_.robot.name;
     d.urdf = scene_.robot.urdf;
     d.effort_limits.resize(arm_.state().q.size());
-    for (int i = 0; i < scene_.robot.chain.n(); ++i) d.effort_limits[i] = scene_.robot.chain.joint(i).limits.effort;
+    for (int i = 0; i < scene_.robot.chain.n(); ++i)
+      d.effort_limits[i] = scene_.robot.chain.joint(i).limits.effort;
     robot_out_.publish(d);
     publish_clock(true);
     publish_state();
@@ -142,12 +150,13 @@ void DynamicsService::take_commands() {
   }
 }
 
-/// A command must be of our size, answer a state of this incarnation that was published, be newer than the one
-/// that holds, and come from the planner with the largest epoch.
+/// A command must be of our size, answer a state of this incarnation that was published, be newer than the
+/// one that holds, and come from the planner with the largest epoch.
 bool DynamicsService::accept(const wire::TorqueCommand& c) {
   if (c.torque.size() != command_.size()) {
     if (refusals_(runtime::Clock::now()))
-      spdlog::warn("command for {} joints refused: arm {} has {}", c.torque.size(), scene_.arm, command_.size());
+      spdlog::warn("command for {} joints refused: arm {} has {}", c.torque.size(), scene_.arm,
+                   command_.size());
     return false;
   }
   if (c.state_incarnation != incarnation_ || c.step > arm_.state().step || c.epoch < epoch_) return false;
@@ -195,7 +204,8 @@ bool DynamicsService::poll_realtime(Time now) {
   if (now < next_step_) return false;
   count_lateness(now);
   for (int i = 0; i < 8 && now >= next_step_; ++i) {
-    const bool reached = scene_.stop == scene::StopRule::when_reached && planner_state_ == wire::PlannerState::reached;
+    const bool reached =
+        scene_.stop == scene::StopRule::when_reached && planner_state_ == wire::PlannerState::reached;
     if (at_end() || (reached && !config_.endless)) {
       end(Outcome::done, reached ? "target reached" : "end of the run");
       return true;
@@ -245,8 +255,9 @@ bool DynamicsService::step() {
   if (!arm_.advance(choose_drive())) {
     validity_ = wire::Validity::diverged;
     publish_state();
-    end(Outcome::diverged, fmt::format("no usable step at t = {:.6f} s: {} iterations left {} N m; a smaller dt_s may help",
-                                       arm_.t_s(), arm_.report().iterations, arm_.report().residual_Nm));
+    end(Outcome::diverged,
+        fmt::format("no usable step at t = {:.6f} s: {} iterations left {} N m; a smaller dt_s may help",
+                    arm_.t_s(), arm_.report().iterations, arm_.report().residual_Nm));
     return false;
   }
   hash_.add(arm_.state().step, arm_.state().q, arm_.state().p);
@@ -360,9 +371,9 @@ bool DynamicsService::load(std::span<const std::byte> bytes) {
   Books books;
   TrajectoryHash::Digest digest;
   std::int32_t mode = -1;
-  const bool whole = u.get(print) && u.get(incarnation) && u.get(s.step) && u.get_doubles(s.q) && u.get_doubles(s.p) &&
-                     u.get_doubles(s.qd) && u.get_doubles(s.history) && u.get(books) && u.get(digest) && u.get(mode) &&
-                     u.get(mode_id) && u.at_end();
+  const bool whole = u.get(print) && u.get(incarnation) && u.get(s.step) && u.get_doubles(s.q) &&
+                     u.get_doubles(s.p) && u.get_doubles(s.qd) && u.get_doubles(s.history) && u.get(books) &&
+                     u.get(digest) && u.get(mode) && u.get(mode_id) && u.at_end();
   const Eigen::Index n = arm_.state().q.size();
   if (!whole || print != fingerprint_ || s.q.size() != n || s.p.size() != n || s.qd.size() != n) return false;
   incarnation_ = incarnation;

@@ -16,10 +16,10 @@ namespace hamel::dynamics {
 
 struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
-  bool endless = false;                            ///< ignore the scene's duration: run until told to end
-  std::string state_dir = {};                           ///< checkpoint folder; empty: none
-  std::chrono::milliseconds patience{10000};       ///< lockstep: how long to wait for one command
-  std::uint64_t incarnation = 0;                   ///< of a replayed run; 0: a new one
+  bool endless = false;                       ///< ignore the scene's duration: run until told to end
+  std::string state_dir = {};                 ///< checkpoint folder; empty: none
+  std::chrono::milliseconds patience{10000};  ///< lockstep: how long to wait for one command
+  std::uint64_t incarnation = 0;              ///< of a replayed run; 0: a new one
 };
 
 /// How the run ended.
@@ -80,12 +80,12 @@ class DynamicsService final : public runtime::Service {
 
   wire::ArmState state_;
   wire::TorqueCommand incoming_;
-  Eigen::VectorXd command_;                        ///< the torque that holds now
-  std::optional<std::uint64_t> command_step_;      ///< the state step it answers; none: no command yet
+  Eigen::VectorXd command_;                    ///< the torque that holds now
+  std::optional<std::uint64_t> command_step_;  ///< the state step it answers; none: no command yet
   bool command_includes_gravity_ = false;
   wire::PlannerState planner_state_ = wire::PlannerState::idle;
   std::uint64_t epoch_ = 0;
-  std::optional<wire::Mode> mode_;                 ///< stop or hold while one is in force
+  std::optional<wire::Mode> mode_;  ///< stop or hold while one is in force
   std::uint64_t mode_id_ = 0;
   wire::Validity validity_ = wire::Validity::holding;
 

@@ -12,8 +12,8 @@
 
 namespace hamel::dynamics {
 
-/// h_0 = 0, h_{k+1} = SHA-256(h_k, step, q, p): one changed bit in any step changes it, and 32 bytes carry it over a
-/// restart.  Bytes are those of the machine (little endian).
+/// h_0 = 0, h_{k+1} = SHA-256(h_k, step, q, p): one changed bit in any step changes it, and 32 bytes carry it
+/// over a restart.  Bytes are those of the machine (little endian).
 class TrajectoryHash {
  public:
   using Digest = std::array<unsigned char, 32>;

@@ -14,7 +14,8 @@ namespace {
 constexpr std::uint64_t kNever = ~std::uint64_t{0};
 }  // namespace
 
-Checked<std::unique_ptr<PerceptionService>> PerceptionService::make(bus::Node& node, const scene::Scene& scene) {
+Checked<std::unique_ptr<PerceptionService>> PerceptionService::make(bus::Node& node,
+                                                                    const scene::Scene& scene) {
   auto source = Source::make(scene.perception);
   if (!source) return source.error();
   return std::unique_ptr<PerceptionService>(new PerceptionService(node, scene, std::move(source).value()));
@@ -36,7 +37,8 @@ bool PerceptionService::poll(Time now) {
   bool published = false;
   if (clock_ && clock_->running) {
     if (clock_->pace == wire::Pace::lockstep) {
-      // One clock message ahead: the next comes after 10 ms of the run, or after one step where that is longer.
+      // One clock message ahead: the next comes after 10 ms of the run, or after one step where that is
+      // longer.
       if (heard) published = publish_until(clock_->t_s + std::max(0.01, clock_->dt_s));
     } else {
       published = publish_until(run_time_s(now));
@@ -98,9 +100,11 @@ std::uint64_t PerceptionService::after(std::uint64_t k) const {
 }
 
 runtime::Clock::time_point PerceptionService::due() const {
-  if (!clock_ || !clock_->running || clock_->pace == wire::Pace::lockstep || !next_) return last_status_ + 500ms;
+  if (!clock_ || !clock_->running || clock_->pace == wire::Pace::lockstep || !next_)
+    return last_status_ + 500ms;
   const double wait_s = static_cast<double>(*next_) * source_.period_s() - clock_->t_s;
-  const auto next = clock_heard_ + std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(wait_s));
+  const auto next = clock_heard_ + std::chrono::duration_cast<runtime::Clock::duration>(
+                                       std::chrono::duration<double>(wait_s));
   return std::min(next, last_status_ + 500ms);
 }
 

@@ -12,10 +12,11 @@
 
 namespace hamel::perception {
 
-/// Sets have sample times k period_s on the run's clock; their content depends on k alone, so a restarted perception
-/// goes on as if nothing had happened.  In lockstep sets are published one clock message ahead, so that the planner
-/// need not wait for them, and none where nothing changes; in real time each period, when its time has come.  Inside a
-/// gap of a stream nothing is published: the planner's last set grows old and it says so.
+/// Sets have sample times k period_s on the run's clock; their content depends on k alone, so a restarted
+/// perception goes on as if nothing had happened.  In lockstep sets are published one clock message ahead, so
+/// that the planner need not wait for them, and none where nothing changes; in real time each period, when
+/// its time has come.  Inside a gap of a stream nothing is published: the planner's last set grows old and it
+/// says so.
 class PerceptionService final : public runtime::Service {
  public:
   /// Fails with what scene::problems() says of the scene's perception.
@@ -45,7 +46,7 @@ class PerceptionService final : public runtime::Service {
   wire::ObstacleSet set_;
   std::optional<wire::SimulationClock> clock_;
   Time clock_heard_{}, last_status_{};
-  std::optional<std::uint64_t> next_;              ///< number of the next set; none: not begun
+  std::optional<std::uint64_t> next_;  ///< number of the next set; none: not begun
   std::uint64_t published_ = 0, repeated_ = 0;
 };
 

@@ -18,7 +18,8 @@ int main(int argc, char** argv) {
   auto node = runtime::open_node(o.bus, scene.value().bus.planner, "hamel-planner");
   if (!node) return runtime::complain("hamel-planner", {node.error()});
 
-  const planner::ServiceConfig config{.pace = runtime::pace(o, scene::Pace::realtime), .state_dir = o.state_dir};
+  const planner::ServiceConfig config{.pace = runtime::pace(o, scene::Pace::realtime),
+                                      .state_dir = o.state_dir};
   auto service = planner::PlannerService::make(*node.value(), scene.value(), config);
   if (!service) return runtime::complain("hamel-planner", {service.error()});
   runtime::Service* const services[] = {service.value().get()};

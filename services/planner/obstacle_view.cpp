@@ -7,7 +7,7 @@ namespace hamel::planner {
 
 namespace {
 
-constexpr std::size_t kMaxWaiting = 64;   ///< sets ahead of time kept for one source
+constexpr std::size_t kMaxWaiting = 64;  ///< sets ahead of time kept for one source
 constexpr std::size_t kMaxSources = 16;
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
-/// What the planner knows of the obstacles at a sample time, from sets that may come early, late, twice or from
-/// several sources.  Pure.
+/// What the planner knows of the obstacles at a sample time, from sets that may come early, late, twice or
+/// from several sources.  Pure.
 
 #include <cstdint>
 #include <deque>
@@ -18,18 +18,18 @@ class ObstacleView {
   /// already, is passed over; a raised incarnation starts its source afresh.
   void add(const wire::ObstacleSet& set);
 
-  /// True when every source that ever spoke has a set for `t_s` and no later one for it can come (lockstep).  False
-  /// before the first set.
+  /// True when every source that ever spoke has a set for `t_s` and no later one for it can come (lockstep).
+  /// False before the first set.
   bool covers(double t_s) const;
 
-  /// Puts the newest sets not younger than `t_s` together, in the order of their sources.  Returns the age of the
-  /// oldest of them [s], 0 for sets that promised no successor, +inf where there is none.
+  /// Puts the newest sets not younger than `t_s` together, in the order of their sources.  Returns the age of
+  /// the oldest of them [s], 0 for sets that promised no successor, +inf where there is none.
   double at(double t_s, std::vector<geometry::Obstacle>& out, wire::Causes& causes);
 
   bool empty() const { return sources_.empty(); }
 
  private:
-  using Queue = std::deque<wire::ObstacleSet>;   // ordered by time
+  using Queue = std::deque<wire::ObstacleSet>;  // ordered by time
   std::map<std::uint32_t, Queue> sources_;
 };
 

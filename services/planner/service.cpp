@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t kCheckpointKind = 0x0201;  // planner, layout 1
 constexpr double kMemoryFresh_s = 0.2;             // realtime: older memory is ramped in again
-constexpr auto kReportPeriod = 10ms;               // realtime: a report each, and one at every change of state
+constexpr auto kReportPeriod = 10ms;  // realtime: a report each, and one at every change of state
 
 struct SavedGoal {
   std::uint64_t id = 0, kind = 0, joints = 0;
@@ -24,7 +24,8 @@ struct SavedGoal {
 
 }  // namespace
 
-Result<std::unique_ptr<PlannerService>, Problem> PlannerService::make(bus::Node& node, const scene::Scene& scene,
+Result<std::unique_ptr<PlannerService>, Problem> PlannerService::make(bus::Node& node,
+                                                                      const scene::Scene& scene,
                                                                       const ServiceConfig& config) {
   std::unique_ptr<PlannerService> s(new PlannerService(node, scene, config));
   if (config.state_dir.empty()) return s;
@@ -126,7 +127,8 @@ bool PlannerService::take_states(Time now) {
     // In lockstep the same state again means that our answer was lost: answer it again.
     const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
     if (s.step % period != 0) continue;
-    if (have_state_ && config_.pace == scene::Pace::realtime && s.step > state_.step + period) ++commands_late_;
+    if (have_state_ && config_.pace == scene::Pace::realtime && s.step > state_.step + period)
+      ++commands_late_;
     state_ = s;
     have_state_ = true;
     answered_ = false;
@@ -171,7 +173,8 @@ void PlannerService::plan(Time now) {
   if (goal_) command_.caused_by.add(wire::ServiceKind::client, goal_->id);
 
   if (config_.pace == scene::Pace::realtime) {
-    const double passed_s = memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
+    const double passed_s =
+        memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
     if (!memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s) planner_.ramp_in();
   }
   const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;
@@ -211,7 +214,8 @@ void PlannerService::publish_report(Time now, bool always) {
   }
   const bool changed = report_.state != shown_ || report_.reason != shown_reason_;
   if (!always && !changed && now - last_report_ < kReportPeriod) return;
-  if (changed) spdlog::debug("t = {:.3f} s: {} {}", state_.t_s, wire::to_string(report_.state), report_.detail);
+  if (changed)
+    spdlog::debug("t = {:.3f} s: {} {}", state_.t_s, wire::to_string(report_.state), report_.detail);
   shown_ = report_.state;
   shown_reason_ = report_.reason;
   last_report_ = now;
@@ -265,8 +269,8 @@ void PlannerService::publish_status(Time now, wire::ServiceState state) {
   s.detail = wire::to_string(shown_);
   s.counters = {{"cycles", cycles_},
                 {"commands_late", commands_late_},
-                {"undecodable", state_in_.undecodable() + obstacles_in_.undecodable() + goal_in_.undecodable() +
-                                    mode_in_.undecodable()}};
+                {"undecodable", state_in_.undecodable() + obstacles_in_.undecodable() +
+                                    goal_in_.undecodable() + mode_in_.undecodable()}};
   status_out_.publish(s);
 }
 
@@ -302,8 +306,8 @@ bool PlannerService::load(std::span<const std::byte> bytes) {
   SavedGoal g;
   Eigen::VectorXd joints;
   auto memory = std::make_unique<Memory>();
-  const bool whole = u.get(n) && u.get(epoch) && u.get(incarnation) && u.get(step) && u.get(mode) && u.get(mode_id) &&
-                     u.get(g) && u.get_doubles(joints) && u.get(*memory) && u.at_end();
+  const bool whole = u.get(n) && u.get(epoch) && u.get(incarnation) && u.get(step) && u.get(mode) &&
+                     u.get(mode_id) && u.get(g) && u.get_doubles(joints) && u.get(*memory) && u.at_end();
   if (!whole || n != static_cast<std::uint64_t>(q_.size())) return false;
   epoch_ = epoch + 1;
   incarnation_ = incarnation;

@@ -16,7 +16,7 @@ namespace hamel::planner {
 
 struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
-  std::string state_dir = {};                           ///< checkpoint folder; empty: none
+  std::string state_dir = {};  ///< checkpoint folder; empty: none
 };
 
 class PlannerService final : public runtime::Service {
@@ -72,9 +72,9 @@ class PlannerService final : public runtime::Service {
   double obstacle_age_s_ = 0;
   Eigen::VectorXd q_, qd_;
 
-  bool have_state_ = false, answered_ = true;      ///< answered: the newest state has its command
-  std::optional<std::uint64_t> incarnation_;       ///< of the arm we know
-  std::optional<std::uint64_t> memory_step_;       ///< the step our memory stands at
+  bool have_state_ = false, answered_ = true;  ///< answered: the newest state has its command
+  std::optional<std::uint64_t> incarnation_;   ///< of the arm we know
+  std::optional<std::uint64_t> memory_step_;   ///< the step our memory stands at
   std::optional<wire::Mode> mode_;
   std::uint64_t mode_id_ = 0, commands_late_ = 0, cycles_ = 0;
   wire::PlannerState shown_ = wire::PlannerState::idle;

@@ -16,7 +16,9 @@ namespace {
 constexpr std::uint32_t kKind = 7;
 constexpr std::size_t kCapacity = 1000;
 
-std::vector<std::byte> payload(unsigned char fill, std::size_t size) { return std::vector<std::byte>(size, std::byte{fill}); }
+std::vector<std::byte> payload(unsigned char fill, std::size_t size) {
+  return std::vector<std::byte>(size, std::byte{fill});
+}
 
 class CheckpointTest : public testing::Test {
  protected:

@@ -1,6 +1,7 @@
 /// MCAP files of ours: what is written is read, and what was cut or changed is said and passed over.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -16,7 +17,9 @@ namespace {
 
 constexpr Compression kAll[] = {Compression::none, Compression::lz4, Compression::zstd};
 
-std::string path(const std::string& name) { return testing::TempDir() + "/hamel_record_" + name + ".mcap"; }
+std::string path(const std::string& name) {
+  return testing::TempDir() + "/hamel_record_" + std::to_string(getpid()) + "_" + name + ".mcap";
+}
 
 /// Message i of a file: its channel, time and content follow from i.
 struct Sample {

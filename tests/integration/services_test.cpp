@@ -1,6 +1,7 @@
 /// The services over the in-process bus, with a planner of the test's own.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstring>
 #include <filesystem>
@@ -18,7 +19,8 @@ using namespace std::chrono_literals;
 namespace {
 
 scene::Scene load(const std::string& name, std::vector<std::string> overrides = {}) {
-  auto s = files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/" + name + ".textproto", overrides);
+  auto s =
+      files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/" + name + ".textproto", overrides);
   if (!s) {
     for (const auto& p : s.error()) ADD_FAILURE() << to_string(p);
     std::abort();
@@ -132,7 +134,11 @@ TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
     d.poll(Clock::now());
     return d.arm().state().step - before;
   };
-  EXPECT_EQ(steps_after([](auto& c) { c.torque.resize(3); c.torque.setZero(); }), 0u);
+  EXPECT_EQ(steps_after([](auto& c) {
+              c.torque.resize(3);
+              c.torque.setZero();
+            }),
+            0u);
   EXPECT_EQ(steps_after([](auto& c) { c.state_incarnation = 2; }), 0u);
   EXPECT_EQ(steps_after([](auto& c) { c.arm = 9; }), 0u);
   EXPECT_EQ(steps_after([](auto& c) { c.step += 1; }), 0u);
@@ -167,7 +173,7 @@ wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t
 }
 
 TEST(Restart, InLockstepContinuesBitForBit) {
-  const std::string folder = testing::TempDir() + "/hamel-restart";
+  const std::string folder = testing::TempDir() + "/hamel-restart-" + std::to_string(getpid());
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   const auto whole = run_to(1.0, "", 4);

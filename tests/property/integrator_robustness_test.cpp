@@ -246,8 +246,8 @@ TEST(Linear, EvaluationsDoNotGrowWithTheChain) {
   }
 }
 
-/// At joints that carry no torque the momentum stays zero as a sum of parts that cancel: rounding must be known by
-/// the parts.
+/// At joints that carry no torque the momentum stays zero as a sum of parts that cancel: rounding must be
+/// known by the parts.
 TEST(Start, ATorqueAtOneJointSetsARestingArmInMotion) {
   for (const Tier tier : {Tier::midpoint, Tier::hamel})
     for (const Root root : {Root::feedback, Root::newton})
