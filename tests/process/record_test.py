@@ -196,5 +196,56 @@ class Record(Files):
         self.assertEqual(hamel("record", "-o", self.file(), "--domain", 63, "--duration", 0.5)[0], 3)
 
 
+class Play(Files):
+    def test_the_recorded_bytes_go_on_the_wire_again_at_their_times(self):
+        file, _ = self.recorded("panda_person", *SHORT)
+        sent = self.payloads(file)
+        for i, vendor in enumerate(("cyclonedds", "fastdds")):
+            with self.subTest(vendor):
+                again = self.file(f"{vendor}.mcap")
+                bus = ["--bus", vendor, "--domain", str(64 + i)]
+                p = subprocess.Popen([BIN / "hamel", "record", "-o", again, *bus], stderr=subprocess.PIPE, text=True)
+                p.stderr.readline()  # it waits for writers
+                code, _, err = hamel("play", file, *bus)
+                self.assertEqual(code, 0, err)
+                self.assertIn(f"{len(sent)} messages", err)
+                p.send_signal(signal.SIGINT)
+                p.communicate(timeout=20)
+                self.assertEqual(p.returncode, 0)
+                self.assertEqual(self.payloads(again), sent)
+
+    def payloads(self, file):
+        """The obstacle sets of a recording, as the log shows them and byte for byte through a copy without compression."""
+        copy = self.file("copy.mcap")
+        hamel("log", "recover", file, "-o", copy, "--compression", "none")
+        data, found = pathlib.Path(copy).read_bytes(), []
+        _, out, _ = hamel("log", "cat", copy, "--topic", "obstacles", "--json")
+        channel = self.channel(data)
+        at = 0
+        while (at := data.find(b"\x05", at)) >= 0:  # message records: opcode, length, channel, sequence, two times
+            length = int.from_bytes(data[at + 1: at + 9], "little")
+            same_times = data[at + 15: at + 23] == data[at + 23: at + 31]
+            if 22 < length < 1 << 20 and data[at + 9: at + 11] == channel and same_times:
+                found.append(data[at + 31: at + 9 + length])
+            at += 1
+        self.assertEqual(len(found), len(out.splitlines()))
+        return found
+
+    @staticmethod
+    def channel(data):
+        at = data.find(len("hamel/v1/obstacles").to_bytes(4, "little") + b"hamel/v1/obstacles")
+        return data[at - 4: at - 2]
+
+    def test_part_of_it_faster(self):
+        file, _ = self.recorded("panda_person", *SHORT)
+        began = time.monotonic()
+        code, _, err = hamel("play", file, "--domain", 66, "--rate", 20, "--start", 0.1, "--until", 0.3)
+        self.assertEqual(code, 0, err)
+        self.assertIn(" 7 messages", err)
+        self.assertLess(time.monotonic() - began, 30)
+        self.assertEqual(hamel("play", file, "--domain", 66, "--topic", "goal")[0], 3)
+        self.assertEqual(hamel("play", file, "--topic", "nonsense")[0], 2)
+
+
 if __name__ == "__main__":
     main()
