@@ -49,11 +49,15 @@ const std::set<std::string>& Comparison::excluded() {
 }
 
 bool Comparison::close_enough(const wire::Field& a, const wire::Field& b, const std::string& name) const {
-  const auto *x = std::get_if<double>(&a.value), *y = std::get_if<double>(&b.value);
-  if (x == nullptr || y == nullptr) return false;
   const auto of_all = tolerances_.find("*"), own = tolerances_.find(name);
   const auto t = own != tolerances_.end() ? own : of_all;
-  return t != tolerances_.end() && std::abs(*x - *y) <= t->second;
+  if (t == tolerances_.end() || a.value.index() != b.value.index()) return false;
+  if (const auto* x = std::get_if<double>(&a.value))
+    return std::abs(*x - std::get<double>(b.value)) <= t->second;
+  const auto* u = std::get_if<std::uint64_t>(&a.value);
+  if (u == nullptr || t != own) return false;  // a whole number only where it is named
+  return std::abs(static_cast<double>(*u) - static_cast<double>(std::get<std::uint64_t>(b.value))) <=
+         t->second;
 }
 
 void Comparison::compare(const Topic& topic, std::uint64_t step, std::span<const std::byte> recorded,

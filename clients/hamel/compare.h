@@ -19,7 +19,7 @@ struct Difference {
 
 class Comparison {
  public:
-  /// "torque=1e-9" (path without indices) or "*=1e-12" (every real number); absolute.
+  /// "torque=1e-9" (path without indices; whole numbers too) or "*=1e-12" (every real number); absolute.
   std::optional<Problem> tolerate(const std::string& field_and_value);
   /// Left out by name: what is wall time by its nature.
   static const std::set<std::string>& excluded();

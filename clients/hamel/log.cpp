@@ -15,12 +15,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-const Topic* find_topic(const std::string& name) {
-  for (const Topic& t : kTopics)
-    if (t.name == name || t.name == "hamel/v1/" + name) return &t;
-  return nullptr;
-}
-
 ordered_json json_of(const wire::Field& f) {
   if (const auto* u = std::get_if<std::uint64_t>(&f.value)) return *u;
   if (const auto* d = std::get_if<double>(&f.value))
@@ -143,6 +137,12 @@ void print_info_json(const std::string& path, const Contents& c) {
 }
 
 }  // namespace
+
+const Topic* find_topic(const std::string& name) {
+  for (const Topic& t : kTopics)
+    if (t.name == name || t.name == "hamel/v1/" + name) return &t;
+  return nullptr;
+}
 
 int log_info(const LogArgs& args) {
   const auto c = contents(args.path);

@@ -56,9 +56,11 @@ class RecordVerbs {
     recover_->add_option("-o,--output", log_args_.out_path, "new file")->required();
     recover_->add_option("--compression", log_args_.compression, "none, lz4 or zstd")->capture_default_str();
     add_replay(app);
+    add_play(app);
   }
 
   std::optional<int> run() const {
+    if (play_->parsed()) return client::play(play_args_);
     if (replay_->parsed()) return client::replay(replay_args_);
     if (record_->parsed()) return client::record(record_args_);
     if (info_->parsed()) return client::log_info(log_args_);
@@ -100,10 +102,27 @@ class RecordVerbs {
     replay_->add_flag("--json", replay_args_.json, "one JSON object");
   }
 
+  void add_play(CLI::App& app) {
+    play_ =
+        app.add_subcommand("play", "put recorded messages on the bus again, byte for byte, at their times");
+    play_->add_option("file", play_args_.path, "recording")->required()->type_name("FILE");
+    play_->add_option("--topic", play_args_.topics, "obstacles, clock, ...; repeat")
+        ->allow_extra_args(false)
+        ->capture_default_str();
+    play_->add_option("--rate", play_args_.rate, "recorded seconds a second")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    play_->add_option("--start", play_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
+    play_->add_option("--until", play_args_.end_s, "up to this time of the run")->type_name("SECONDS");
+    play_->add_flag("--loop", play_args_.loop, "begin anew at the end, until Ctrl-C");
+    runtime::add_bus_options(*play_, play_args_.bus);
+  }
+
   client::RecordArgs record_args_;
+  client::PlayArgs play_args_;
   client::ReplayArgs replay_args_;
   client::LogArgs log_args_;
-  CLI::App *record_, *replay_, *log_, *info_, *cat_, *csv_, *recover_;
+  CLI::App *record_, *play_, *replay_, *log_, *info_, *cat_, *csv_, *recover_;
 };
 CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
   auto* trade =

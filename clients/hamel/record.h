@@ -28,4 +28,17 @@ int log_cat(const LogArgs& args);
 int log_csv(const LogArgs& args);
 int log_recover(const LogArgs& args);
 
+struct PlayArgs {
+  runtime::BusOptions bus;
+  std::string path;
+  std::vector<std::string> topics{"obstacles"};
+  double rate = 1, begin_s = 0, end_s = -1;
+  bool loop = false;
+};
+/// Puts recorded messages on the bus again, byte for byte, at the times of their recording.
+int play(const PlayArgs& args);
+
+/// The topic of a full or a short name ("state"); null: there is none.
+const Topic* find_topic(const std::string& name);
+
 }  // namespace hamel::client

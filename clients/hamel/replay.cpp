@@ -82,11 +82,13 @@ class Judge {
   std::size_t at_ = 0;
 };
 
-std::uint64_t cause(const Recorded& r, wire::ServiceKind kind) {
-  std::uint64_t most = 0;
+/// The newest message of a kind of service that this one names as its cause; none: it knew none.
+std::optional<std::uint64_t> cause(const Recorded& r, wire::ServiceKind kind) {
+  std::optional<std::uint64_t> newest;
   for (std::size_t i = 0; i < r.caused_by.size; ++i)
-    if (r.caused_by.items[i].service == kind) most = std::max(most, r.caused_by.items[i].sequence);
-  return most;
+    if (r.caused_by.items[i].service == kind)
+      newest = std::max(newest.value_or(0), r.caused_by.items[i].sequence);
+  return newest;
 }
 
 /// How many of the messages belong to the first life of their writer; a note where there is another.
@@ -112,10 +114,9 @@ std::optional<Problem> into_planner(bus::Node& node, const Tape& tape, Compariso
   Time now = runtime::Clock::now();
   for (std::size_t i = 0; i < end; ++i) {
     const Recorded& c = tape.commands[i];
-    const std::uint64_t set = cause(c, wire::ServiceKind::perception),
-                        goal = cause(c, wire::ServiceKind::client);
-    goals.send_while([&](const Recorded& r) { return r.sequence <= goal; });
-    obstacles.send_while([&](const Recorded& r) { return r.sequence <= set; });
+    const auto set = cause(c, wire::ServiceKind::perception), goal = cause(c, wire::ServiceKind::client);
+    goals.send_while([&](const Recorded& r) { return goal && r.sequence <= *goal; });
+    obstacles.send_while([&](const Recorded& r) { return set && r.sequence <= *set; });
     states.send_while([&](const Recorded& s) {
       const bool wanted = s.incarnation == c.incarnation && s.step <= c.step;
       if (wanted) modes.send_before(s.place);
@@ -152,11 +153,8 @@ void drive_realtime(dynamics::DynamicsService& arm, const Tape& tape, Feed& comm
   Time now = runtime::Clock::now();
   for (std::size_t i = 1; i < end && !arm.finished(); ++i) {
     const Recorded& s = tape.states[i];
-    bool commanded = false;
-    for (std::size_t k = 0; k < s.caused_by.size; ++k)
-      commanded |= s.caused_by.items[k].service == wire::ServiceKind::planner;
-    const std::uint64_t command = cause(s, wire::ServiceKind::planner);
-    commands.send_while([&](const Recorded& c) { return commanded && c.step <= command; });
+    const auto command = cause(s, wire::ServiceKind::planner);
+    commands.send_while([&](const Recorded& c) { return command && c.step <= *command; });
     modes.send_before(s.place);
     arm.poll(now);
     now = arm.due();

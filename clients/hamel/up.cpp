@@ -66,6 +66,9 @@ std::vector<std::string> command(const std::string& service, const RunArgs& a, c
   if (!b.interface_name.empty()) c.insert(c.end(), {"--interface", b.interface_name});
   for (const auto& p : b.peers) c.insert(c.end(), {"--peer", p});
   if (a.run.verbose) c.push_back("--verbose");
+  // The recorder is to hear everything from the first word on: it, the monitor and the other services.
+  if (!a.record_path.empty())
+    c.insert(c.end(), {"--readers", service == "dynamics" && s.steered ? "3" : "2"});
   return c;
 }
 

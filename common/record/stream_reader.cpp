@@ -92,7 +92,8 @@ std::optional<Item> StreamReader::next_in_file() {
   const auto op = in.get<Op>();
   const auto length = in.get<std::uint64_t>();
   if (op == Op{0}) return lost(at, "no record begins here");
-  if (length > file_->size() - at - kFrame) return lost(at, "a record is longer than the file");
+  if (length > file_->size() - at - kFrame)
+    return lost(at, "the file ends within a record: cut, or a length is wrong");
   if (length > kMaxRecord) return lost(at, "a record is too large");
   if (!file_->read(at, kFrame + length, record_)) return lost(at, "cannot be read");
   if (op == Op::chunk && !is_chunk(record_, file_->size() - at))

@@ -19,6 +19,15 @@ bool run(bus::Node& node, std::span<Service* const> services, const Service& lea
   return !stop.requested();
 }
 
+void await_readers(bus::Node& node, const Service& service, int readers, StopSignal& stop) {
+  if (readers <= 0) return;
+  const auto deadline = Clock::now() + std::chrono::seconds(5);
+  while (service.readers() < readers && Clock::now() < deadline && !stop.requested())
+    node.wait(Clock::now() + std::chrono::milliseconds(10));
+  const auto settled = Clock::now() + std::chrono::milliseconds(200);
+  while (Clock::now() < settled && !stop.requested()) node.wait(settled);
+}
+
 void linger(bus::Node& node) {
   if (node.options().vendor == bus::Vendor::inproc) return;
   const auto until = Clock::now() + std::chrono::milliseconds(300);

@@ -36,6 +36,13 @@ void add_run_options(CLI::App& app, RunOptions& o) {
   add_bus_options(app, o.bus);
 }
 
+void add_readers_option(CLI::App& app, RunOptions& o) {
+  app.add_option("--readers", o.readers,
+                 "begin when so many readers are there (a recorder among them), or after 5 s")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+}
+
 Checked<scene::Scene> load(const RunOptions& o) {
   auto s = files::load_scene(o.scene_path, o.overrides);
   if (!s) return s;

@@ -36,11 +36,14 @@ struct RunOptions {
   bool lockstep = false, realtime = false;  ///< at most one; neither: the program's default
   double duration_s = -1;                   ///< < 0: the scene's, or for a lone service: until told to end
   std::string state_dir;                    ///< checkpoints; empty: none
+  int readers = 0;                          ///< a lone service: begin when its topics have so many readers
   bool verbose = false;
 };
 
 void add_bus_options(CLI::App& app, BusOptions& o);
 void add_run_options(CLI::App& app, RunOptions& o);
+/// Of a service in its own process.
+void add_readers_option(CLI::App& app, RunOptions& o);
 
 /// The scene of these options, or every problem.  A --duration replaces the scene's.
 Checked<scene::Scene> load(const RunOptions& o);

@@ -34,6 +34,7 @@ class DynamicsService final : public runtime::Service {
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   bool finished() const override { return outcome_ != Outcome::running; }
+  int readers() const override { return state_out_.matched(); }
   void close() override;
 
   Outcome outcome() const { return outcome_; }

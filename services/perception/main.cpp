@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   CLI::App app{"hamel-perception: publishes the obstacles of a scene on the run's clock"};
   runtime::RunOptions o;
   runtime::add_run_options(app, o);
+  runtime::add_readers_option(app, o);
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   runtime::start_log("hamel-perception", o.verbose);
 
@@ -21,6 +22,7 @@ int main(int argc, char** argv) {
 
   auto service = perception::PerceptionService::make(*node.value(), scene.value());
   if (!service) return runtime::complain("hamel-perception", service.error());
+  runtime::await_readers(*node.value(), *service.value(), o.readers, stop);
   runtime::Service* const services[] = {service.value().get()};
   runtime::run(*node.value(), services, *services[0], stop);
   return runtime::kDone;

@@ -24,6 +24,7 @@ class PerceptionService final : public runtime::Service {
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   bool finished() const override { return false; }
+  int readers() const override { return sets_out_.matched(); }
   void close() override;
 
  private:

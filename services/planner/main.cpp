@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   CLI::App app{"hamel-planner: steers an arm to its goal past the obstacles"};
   runtime::RunOptions o;
   runtime::add_run_options(app, o);
+  runtime::add_readers_option(app, o);
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   runtime::start_log("hamel-planner", o.verbose);
 
@@ -22,6 +23,7 @@ int main(int argc, char** argv) {
                                       .state_dir = o.state_dir};
   auto service = planner::PlannerService::make(*node.value(), scene.value(), config);
   if (!service) return runtime::complain("hamel-planner", {service.error()});
+  runtime::await_readers(*node.value(), *service.value(), o.readers, stop);
   runtime::Service* const services[] = {service.value().get()};
   runtime::run(*node.value(), services, *services[0], stop);
   return runtime::kDone;

@@ -1,6 +1,7 @@
 #pragma once
 /// The planner service in its shell: states, obstacles, goals and modes in, commands and reports out.
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,6 +28,7 @@ class PlannerService final : public runtime::Service {
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   bool finished() const override { return false; }
+  int readers() const override { return std::min(command_out_.matched(), report_out_.matched()); }
   void close() override;
 
  private:

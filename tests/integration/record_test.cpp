@@ -90,6 +90,7 @@ std::string load(const std::string& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 void store(const std::string& file, const std::string& bytes) {
+  std::filesystem::remove(file);  // a file that is cut to nothing and written again is forced to the disk
   std::ofstream(file, std::ios::binary | std::ios::trunc)
       .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
