@@ -207,12 +207,26 @@ scene::ScriptedObstacle read_obstacle(const text::Obstacle& m, int i, Problems& 
   return o;
 }
 
+void read_flaws(const text::Flaws& m, SceneParts& out) {
+  const Fields read(m, "perception.flaws.", out.missing);
+  scene::Flaws& f = out.perception.flaws.emplace();
+  read("seed", f.seed);
+  read("noise_m", f.noise_m);
+  read("dropout", f.dropout);
+  read("latency_s", f.latency_s);
+  read("eye_m", f.eye_m);
+  read("look", f.look);
+  read("view_rad", f.view_rad);
+  read("range_m", f.range_m);
+}
+
 void read_perception(const text::Perception& m, SceneParts& out) {
   const Fields read(m, "perception.", out.missing);
   read("rate_hz", out.perception.rate_hz);
   read("bus", out.bus.perception);
   for (int i = 0; i < m.obstacles_size(); ++i)
     out.perception.obstacles.push_back(read_obstacle(m.obstacles(i), i, out.missing));
+  if (m.has_flaws()) read_flaws(m.flaws(), out);
   if (!m.has_stream()) return;
   const Fields stream(m.stream(), "perception.stream.", out.missing);
   scene::Stream& s = out.perception.stream.emplace();
@@ -223,6 +237,7 @@ void read_perception(const text::Perception& m, SceneParts& out) {
   stream("rate", s.rate);
   stream("start_s", s.start_s);
   stream("loop", s.loop);
+  stream("glitch_mps", s.glitch_mps);
   out.stream_start_given = m.stream().has_start_s();
 }
 

@@ -110,6 +110,7 @@ void check_stream(Rules& r, const PerceptionOptions& o) {
   check_pose(r, "stream.", s.X_WS);
   r.positive("stream.scale", s.scale);
   r.positive("stream.rate", s.rate);
+  r.positive("stream.glitch_mps", s.glitch_mps);
   if (!std::isfinite(s.start_s)) r.fail("stream.start_s", "is not finite");
   if (s.samples.empty()) r.fail("stream.path", "has no samples");
   std::set<std::uint32_t> ids;
@@ -120,6 +121,17 @@ void check_stream(Rules& r, const PerceptionOptions& o) {
     if (ids.count(o.obstacles[i].at_start.id) != 0)
       r.fail(at("obstacles", i) + ".id",
              "= " + std::to_string(o.obstacles[i].at_start.id) + " is also an id of the stream");
+}
+
+void check_flaws(Rules& r, const Flaws& f) {
+  r.not_negative("flaws.noise_m", f.noise_m);
+  r.within("flaws.dropout", f.dropout, 0, 1);
+  r.not_negative("flaws.latency_s", f.latency_s);
+  r.must(f.view_rad > 0 && f.view_rad <= 3.1415926535897936, "flaws.view_rad", f.view_rad, "in (0, pi]");
+  r.positive_or_inf("flaws.range_m", f.range_m);
+  if (!f.eye_m.allFinite()) r.fail("flaws.eye_m", "has a number that is not finite");
+  if (!f.look.allFinite() || f.look.isZero())
+    r.fail("flaws.look", "must be a direction: finite and not zero");
 }
 
 /// True where all joints turn about parallel axes.
@@ -166,6 +178,7 @@ Problems problems(const PerceptionOptions& o) {
       r.fail(at("obstacles", i) + ".id", "= " + std::to_string(id) + " is used twice");
   }
   if (o.stream) check_stream(r, o);
+  if (o.flaws) check_flaws(r, *o.flaws);
   return r.take();
 }
 

@@ -3,6 +3,8 @@
 /// Files become scenes in common/files; nothing here reads a file.
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,13 +61,27 @@ struct Stream {
   double rate = 1;                    ///< stream seconds per run second, > 0
   double start_s = 0;                 ///< stream time at run time 0
   bool loop = false;                  ///< begins anew, one sample interval behind its end
+  double glitch_mps = 10;             ///< a larger speed between two samples is taken for a wrong sample, > 0
   std::vector<StreamSample> samples;  ///< what the file holds, in stream frame and stream time
+};
+
+/// What a sensor does to the truth, on purpose: to test the planner.  Same seed, same flaws.
+struct Flaws {
+  std::uint64_t seed = 1;
+  double noise_m = 0;    ///< standard deviation of each coordinate of a position, >= 0
+  double dropout = 0;    ///< probability that an obstacle is missing in a set, in [0, 1]
+  double latency_s = 0;  ///< a set shows what was so long before its stamp, >= 0
+  Eigen::Vector3d eye_m = Eigen::Vector3d::Zero();           ///< the field of view: from here, world
+  Eigen::Vector3d look = Eigen::Vector3d::UnitX();           ///< in this direction, not zero, world
+  double view_rad = 3.141592653589793;                       ///< centres within this angle of it, in (0, pi]
+  double range_m = std::numeric_limits<double>::infinity();  ///< and this distance are seen, > 0
 };
 
 struct PerceptionOptions {
   double rate_hz = 30;  ///< obstacle sets per second, > 0; static scenes publish on change
   std::vector<ScriptedObstacle> obstacles;
   std::optional<Stream> stream;
+  std::optional<Flaws> flaws;
 };
 
 /// The bus each service talks over: "inproc", "fastdds" or "cyclonedds"; empty: whatever the program was

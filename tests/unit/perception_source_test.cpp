@@ -209,5 +209,72 @@ TEST(Source, SameTimeSameBitsInAnyOrder) {
   for (int k = 99; k >= 0; --k) EXPECT_EQ(at(s, 0.0123 * k)[0].X_WO.p, forth[static_cast<std::size_t>(k)]);
 }
 
+TEST(Source, AGlitchOfThirtyMetresASecondGivesNoVelocity) {
+  std::vector<scene::StreamSample> samples;
+  for (int i = 0; i < 10; ++i) samples.push_back({i * 0.1, 1, {0.1 * i, 0, 0}, 0.1});  // 1 m/s along x
+  samples[5].p_m.y() = 3;                                                              // and back: 30 m/s
+  const Source s = make(with_stream(samples));
+  for (int k = 0; k < 29; ++k) {
+    const auto o = at(s, k / 30.0);
+    ASSERT_EQ(o.size(), 1u);
+    EXPECT_TRUE(o[0].velocity_known) << k;
+    EXPECT_LT((o[0].V_WO.tail<3>() - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9) << k;
+  }
+  auto all = with_stream(samples);
+  all.stream->glitch_mps = 100;
+  EXPECT_GT(at(make(all), 0.45)[0].V_WO.norm(), 29) << "the guard can be turned off";
+}
+
+scene::PerceptionOptions flawed(const scene::Flaws& f) {
+  scene::PerceptionOptions o;
+  for (std::uint32_t id = 1; id <= 200; ++id) o.obstacles.push_back(sphere(id, {1.0 * id, 0, 0}));
+  o.flaws = f;
+  return o;
+}
+
+TEST(Flaws, AreTheSameForTheSameSeedAndOtherwiseForAnother) {
+  const scene::Flaws f{.seed = 7, .noise_m = 0.01, .dropout = 0.2};
+  const Source a = make(flawed(f)), b = make(flawed(f));
+  EXPECT_FALSE(a.is_static());
+  const auto x = at(a, 0.5), y = at(b, 0.5), later = at(a, 0.6);
+  ASSERT_EQ(x.size(), y.size());
+  for (std::size_t i = 0; i < x.size(); ++i) EXPECT_EQ(x[i].X_WO.p, y[i].X_WO.p);
+  EXPECT_NE(x[0].X_WO.p, later[0].X_WO.p);
+  EXPECT_NE(x[0].X_WO.p, at(make(flawed({.seed = 8, .noise_m = 0.01})), 0.5)[0].X_WO.p);
+}
+
+TEST(Flaws, NoiseAndDropoutAreAsLargeAsStated) {
+  const Source s = make(flawed({.seed = 3, .noise_m = 0.01, .dropout = 0.25}));
+  double sum = 0, squares = 0;
+  std::size_t n = 0;
+  for (int k = 0; k < 100; ++k)
+    for (const Obstacle& o : at(s, k / 30.0)) {
+      ++n;
+      EXPECT_EQ(o.sigma_m, 0.01);
+      const Eigen::Vector3d e = o.X_WO.p - Eigen::Vector3d(1.0 * o.id, 0, 0);
+      sum += e.sum(), squares += e.squaredNorm();
+    }
+  EXPECT_NEAR(static_cast<double>(n) / 20000, 0.75, 0.02);
+  EXPECT_NEAR(sum / static_cast<double>(3 * n), 0, 0.0005);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(3 * n)), 0.01, 0.0005);
+}
+
+TEST(Flaws, OnlyWhatIsInTheFieldOfViewIsSeen) {
+  EXPECT_EQ(at(make(flawed({.range_m = 20.5})), 0).size(), 20u);
+  EXPECT_EQ(at(make(flawed({.eye_m = {100.5, 0, 0}, .view_rad = 0.1})), 0).size(), 100u);
+  EXPECT_TRUE(at(make(flawed({.look = {-1, 0, 0}, .view_rad = 0.1})), 0).empty());
+}
+
+TEST(Flaws, LatencyShowsThePastAndRulesAreKept) {
+  scene::PerceptionOptions o;
+  o.obstacles = {sphere(1, {0, 0, 0})};
+  o.obstacles[0].velocity_mps = {1, 0, 0};
+  o.flaws.emplace().latency_s = 0.1;
+  EXPECT_NEAR(at(make(o), 0.5)[0].X_WO.p.x(), 0.4, 1e-12);
+  EXPECT_EQ(at(make(o), 0.05)[0].X_WO.p.x(), 0);
+  o.flaws->dropout = 2;
+  EXPECT_FALSE(Source::make(o));
+}
+
 }  // namespace
 }  // namespace hamel::perception

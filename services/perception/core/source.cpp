@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "services/perception/core/flaws.h"
+
 namespace hamel::perception {
 namespace {
 
@@ -33,8 +35,9 @@ Checked<Source> Source::make(const scene::PerceptionOptions& options) {
 }
 
 Source::Source(const scene::PerceptionOptions& options)
-    : scripted_(options.obstacles), rate_hz_(options.rate_hz) {
+    : scripted_(options.obstacles), flaws_(options.flaws), rate_hz_(options.rate_hz) {
   moves_ = std::any_of(scripted_.begin(), scripted_.end(), moves);
+  if (flaws_) moves_ |= !scripted_.empty() && (flaws_->noise_m > 0 || flaws_->dropout > 0);
   if (options.stream) {
     stream_ = *options.stream;
     rate_hz_ = std::max(rate_hz_, kLeastStreamRate_hz);
@@ -58,8 +61,11 @@ void Source::make_frames() {
   end_s_ = frames_[last].t_s + interval_s;
 }
 
+/// The time that a set with this stamp shows.
+double Source::seen(double t_s) const { return flaws_ ? std::max(0.0, t_s - flaws_->latency_s) : t_s; }
+
 double Source::stream_time(double t_s) const {
-  const double s = stream_.start_s + stream_.rate * t_s;
+  const double s = stream_.start_s + stream_.rate * seen(t_s);
   const double first = frames_.front().t_s;
   if (!stream_.loop || s < end_s_) return s;
   return first + std::fmod(s - first, end_s_ - first);
@@ -93,31 +99,44 @@ const scene::StreamSample* Source::find(std::size_t frame, std::uint32_t id) con
   return at != end && at->id == id ? &*at : nullptr;
 }
 
+/// The velocity of an obstacle from one frame to the next, in stream lengths per stream second; none where it
+/// is not in both, or nothing is known between them.
+std::optional<Eigen::Vector3d> Source::velocity(std::size_t frame, std::uint32_t id) const {
+  const bool wraps = stream_.loop && frame + 1 == frames_.size();
+  if ((!wraps && frame + 1 >= frames_.size()) || is_gap(frame)) return {};
+  const auto *here = find(frame, id), *next = find(wraps ? 0 : frame + 1, id);
+  if (here == nullptr || next == nullptr) return {};
+  const double span_s = (wraps ? end_s_ : frames_[frame + 1].t_s) - frames_[frame].t_s;
+  return (next->p_m - here->p_m) / span_s;
+}
+
 /// One obstacle of the stream: on the line to its next place, else on the line from its last one, else
-/// standing.
+/// standing.  A line that is too fast has a wrong sample at one end: the velocity is then that of the line
+/// before, or behind.
 geometry::Obstacle Source::place(std::size_t frame, const scene::StreamSample& sample,
                                  double stream_t_s) const {
   geometry::Obstacle out;
   out.id = sample.id;
   out.shape.kind = geometry::ShapeKind::sphere;
   double radius_m = sample.radius_m;
-  Eigen::Vector3d v_S = Eigen::Vector3d::Zero();  // stream lengths per stream second
-  out.velocity_known = true;
   const double since_s = stream_t_s - frames_[frame].t_s;
-  const bool wraps = stream_.loop && frame + 1 == frames_.size();
-  const bool goes_on = wraps || (frame + 1 < frames_.size() && !is_gap(frame));
-  if (const auto* next = goes_on ? find(wraps ? 0 : frame + 1, sample.id) : nullptr) {
+  const auto now = velocity(frame, sample.id);
+  const auto before = frame > 0 ? velocity(frame - 1, sample.id) : std::nullopt;
+  if (now) {
+    const bool wraps = frame + 1 == frames_.size();
     const double span_s = (wraps ? end_s_ : frames_[frame + 1].t_s) - frames_[frame].t_s;
-    v_S = (next->p_m - sample.p_m) / span_s;
-    radius_m += (next->radius_m - sample.radius_m) * (since_s / span_s);
-  } else if (const auto* last = frame > 0 && !is_gap(frame - 1) ? find(frame - 1, sample.id) : nullptr) {
-    v_S = (sample.p_m - last->p_m) / (frames_[frame].t_s - frames_[frame - 1].t_s);
-  } else {
-    out.velocity_known = false;
+    radius_m += (find(wraps ? 0 : frame + 1, sample.id)->radius_m - sample.radius_m) * (since_s / span_s);
+  }
+  const Eigen::Vector3d v_S = now ? *now : before.value_or(Eigen::Vector3d::Zero());
+  out.velocity_known = false;
+  for (const auto& v : {now, before, velocity(frame + 1, sample.id)}) {
+    if (out.velocity_known || !v || v->norm() * stream_.scale > stream_.glitch_mps || !(now || before))
+      continue;
+    out.velocity_known = true;
+    out.V_WO.tail<3>() = stream_.X_WS.R * *v * (stream_.scale * stream_.rate);
   }
   out.shape.dims_m[0] = radius_m * stream_.scale;
   out.X_WO.p = stream_.X_WS * Eigen::Vector3d(stream_.scale * (sample.p_m + v_S * since_s));
-  out.V_WO.tail<3>() = stream_.X_WS.R * v_S * (stream_.scale * stream_.rate);
   return out;
 }
 
@@ -126,11 +145,13 @@ bool Source::at(double t_s, std::vector<geometry::Obstacle>& out) const {
   double gap_end_s = 0;
   const double s = frames_.empty() ? 0 : stream_time(t_s);
   if (in_gap(s, gap_end_s)) return false;
-  for (const scene::ScriptedObstacle& o : scripted_) out.push_back(scripted_at(o, t_s));
-  if (frames_.empty() || s < frames_.front().t_s || s >= end_s_) return true;
-  const std::size_t k = frame_at(s);
-  for (std::size_t i = frames_[k].begin; i < frames_[k].end; ++i)
-    out.push_back(place(k, stream_.samples[i], s));
+  for (const scene::ScriptedObstacle& o : scripted_) out.push_back(scripted_at(o, seen(t_s)));
+  if (!frames_.empty() && s >= frames_.front().t_s && s < end_s_) {
+    const std::size_t k = frame_at(s);
+    for (std::size_t i = frames_[k].begin; i < frames_[k].end; ++i)
+      out.push_back(place(k, stream_.samples[i], s));
+  }
+  if (flaws_) apply(*flaws_, static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * rate_hz_)), out);
   return true;
 }
 

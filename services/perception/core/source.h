@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/base/result.h"
@@ -23,8 +24,9 @@ inline constexpr double kLeastStreamRate_hz = 30;
 /// Stream: time in it is start_s + rate t.  Between two of its times an obstacle moves on the straight line
 /// between its two places, with that line's velocity.  An id that is absent from the next time goes on with
 /// its last velocity until then and is gone after; one that is seen a single time stands there with its
-/// velocity unknown. Before the first sample and behind the end there is nothing; the end is one sample
-/// interval behind the last.
+/// velocity unknown.  A velocity over Stream::glitch_mps is that of a wrong sample and not used.  Flaws,
+/// where the options have them, are the same each time for the same set.  Before the first sample and behind
+/// the end there is nothing; the end is one sample interval behind the last.
 class Source {
  public:
   /// The source, or what scene::problems() says of the options.  Copies the stream's samples.
@@ -54,7 +56,9 @@ class Source {
 
   explicit Source(const scene::PerceptionOptions& options);
   void make_frames();
+  double seen(double t_s) const;
   double stream_time(double t_s) const;
+  std::optional<Eigen::Vector3d> velocity(std::size_t frame, std::uint32_t id) const;
   std::size_t frame_at(double stream_t_s) const;
   bool is_gap(std::size_t frame) const;
   bool in_gap(double stream_t_s, double& gap_end_s) const;
@@ -64,6 +68,7 @@ class Source {
 
   std::vector<scene::ScriptedObstacle> scripted_;
   scene::Stream stream_;
+  std::optional<scene::Flaws> flaws_;
   std::vector<Frame> frames_;
   double rate_hz_ = 0;
   double end_s_ = 0;  ///< stream time at which the last sample is over
