@@ -164,9 +164,7 @@ CLI::App* add_figures(CLI::App& app, client::FiguresArgs& a) {
   return figures;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int verbs(int argc, char** argv) {
   CLI::App app{"hamel: robot-arm dynamics and reactive planning as services on a DDS network"};
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "help of every verb");
@@ -194,7 +192,7 @@ int main(int argc, char** argv) {
   for (const auto& [name, help] :
        {std::pair{"stop", "brake to rest and stay, until resume"},
         std::pair{"hold", "keep this place, until resume"}, std::pair{"resume", "go on to the goal"},
-        std::pair{"clear-fault", "leave FAULT and go on"}}) {
+        std::pair{"clear-fault", "forget faults and clocks; a stop or hold stays"}}) {
     auto* m = app.add_subcommand(name, help);
     m->add_option("--arm", mode_args.arm, "arm")->capture_default_str();
     runtime::add_bus_options(*m, mode_args.bus);
@@ -238,6 +236,21 @@ int main(int argc, char** argv) {
     if (!m->parsed()) continue;
     mode_args.mode = m->get_name();
     return client::mode(mode_args);
+  }
+  return runtime::kBadInput;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const int code = verbs(argc, argv);
+    if (std::fflush(stdout) == 0) return code;
+    std::fputs("hamel: cannot write to standard output\n", stderr);
+  } catch (const std::exception& e) {
+    std::fputs("hamel: ", stderr);
+    std::fputs(e.what(), stderr);
+    std::fputs("\n", stderr);
   }
   return runtime::kBadInput;
 }

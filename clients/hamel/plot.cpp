@@ -45,7 +45,8 @@ Result<std::vector<Row>, Problem> read_rows(const std::string& path, int n) {
     return column.contains(name) ? static_cast<long>(column[name]) : -1;
   };
   for (const std::string& name :
-       {std::string("t_s"), fmt::format("q{}", n), std::string("ee_x_m"), std::string("clearance_m")})
+       {std::string("t_s"), std::string("q1"), fmt::format("q{}", n), std::string("ee_x_m"),
+        std::string("ee_z_m"), std::string("clearance_m"), std::string("energy_J")})
     if (at(name) < 0)
       return Problem{path + ":1", "has no column " + name + ": written by --csv of this scene?"};
   std::vector<Row> rows;

@@ -31,6 +31,7 @@ int run(const RunArgs& args) {
   const auto scene = runtime::load(args.run);
   if (!scene) return runtime::complain("hamel run", scene.error());
   const scene::Scene& s = scene.value();
+  for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);
   auto node = runtime::open_node(args.run.bus, "inproc", "hamel-run");
   if (!node) return runtime::complain("hamel run", {node.error()});
   bus::Node& n = *node.value();

@@ -19,10 +19,11 @@ constexpr int kQuickDeaths = 10;
 constexpr int kBadInputCode = 2;
 }  // namespace
 
-void Supervisor::add(std::string name, std::vector<std::string> command) {
+void Supervisor::add(std::string name, std::vector<std::string> command, bool ends_by_itself) {
   Child c;
   c.name = std::move(name);
   c.command = std::move(command);
+  c.ends_by_itself = ends_by_itself;
   children_.push_back(std::move(c));
   quick_deaths_.push_back(0);
 }
@@ -60,7 +61,7 @@ void Supervisor::died(Child& c, int status, Clock::time_point now) {
   const auto i = static_cast<std::size_t>(&c - children_.data());
   c.pid = -1;
   c.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  if (c.exit_code == 0) {
+  if (c.ends_by_itself && (c.exit_code == 0 || c.exit_code == 1 || c.exit_code == 3)) {
     c.done = true;
     return;
   }
@@ -69,7 +70,7 @@ void Supervisor::died(Child& c, int status, Clock::time_point now) {
   quick_deaths_[i] = now - c.started < 2s ? quick_deaths_[i] + 1 : 0;
   if (c.exit_code == kBadInputCode || quick_deaths_[i] >= kQuickDeaths) {
     spdlog::error("{} died ({}); giving it up", c.name, how);
-    c.done = true;
+    c.done = c.given_up = true;
     return;
   }
   c.restart_at = now + (quick_deaths_[i] > 1 ? 500ms : 0ms);
@@ -117,7 +118,7 @@ int Supervisor::restarts() const {
 
 const Supervisor::Child* Supervisor::failed() const {
   for (const Child& c : children_)
-    if (c.done && c.exit_code != 0 && c.exit_code != 1 && c.exit_code != 3) return &c;
+    if (c.given_up) return &c;
   return nullptr;
 }
 

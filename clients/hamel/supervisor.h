@@ -18,13 +18,15 @@ class Supervisor {
     std::vector<std::string> command;
     pid_t pid = -1;  ///< -1: not running
     int restarts = 0;
+    bool ends_by_itself = false;  ///< its end with 0, 1 or 3 is the end of its job
+    bool given_up = false;
     bool done = false;  ///< ended as it should, or given up
     int exit_code = 0;  ///< of its last end; 128 + signal for a signal
     Clock::time_point started{}, restart_at{};
   };
 
   ~Supervisor() { end(); }
-  void add(std::string name, std::vector<std::string> command);
+  void add(std::string name, std::vector<std::string> command, bool ends_by_itself);
   /// Starts what should run, notes what died; a child that ended with 0 is done, one with 2 (bad input) or
   /// that died ten times within two seconds of its start is given up.  Logs each event.
   void poll(Clock::time_point now);

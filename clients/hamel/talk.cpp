@@ -67,6 +67,9 @@ int goal(const GoalArgs& args) {
     g.orientation_xyzw /= norm;
   }
 
+  if (!g.position_m.allFinite() || !g.orientation_xyzw.allFinite() || !g.joints.allFinite())
+    return runtime::complain("hamel goal", {{"target", "every number must be finite"}});
+
   wire::Publisher<wire::Goal> out(n);
   wire::Subscription<wire::PlannerReport> reports(n);
   wire::PlannerReport r;
@@ -108,6 +111,7 @@ int mode(const ModeArgs& args) {
     if (m.arm != args.arm) return false;
     if (wanted == wire::Mode::stop) return m.validity == wire::Validity::stopped;
     if (wanted == wire::Mode::hold) return m.validity == wire::Validity::holding;
+    if (wanted == wire::Mode::clear_fault) return true;
     return m.validity == wire::Validity::valid || m.validity == wire::Validity::command_stale;
   };
   if (!wait_for(n, states, s, obeyed)) return nobody(args.mode.c_str(), "arm", args.bus);

@@ -80,6 +80,7 @@ int up(const RunArgs& args) {
   const auto scene = runtime::load(args.run);
   if (!scene) return runtime::complain("hamel up", scene.error());
   const scene::Scene& s = scene.value();
+  for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);
   auto node = runtime::open_node(args.run.bus, s.bus.dynamics, "hamel-up");
   if (!node) return runtime::complain("hamel up", {node.error()});
   bus::Node& n = *node.value();
@@ -112,8 +113,8 @@ int up(const RunArgs& args) {
   Supervisor supervisor;
   if (s.steered)
     for (const char* name : {"perception", "planner"})
-      supervisor.add(name, command(name, args, s, pace, state_dir));
-  supervisor.add("dynamics", command("dynamics", args, s, pace, state_dir));
+      supervisor.add(name, command(name, args, s, pace, state_dir), false);
+  supervisor.add("dynamics", command("dynamics", args, s, pace, state_dir), true);
   Children children(supervisor, monitor);
   std::vector<runtime::Service*> services{&children, &monitor};
   if (recorder.value()) services.push_back(recorder.value().get());

@@ -46,8 +46,10 @@ void add_readers_option(CLI::App& app, RunOptions& o) {
 Checked<scene::Scene> load(const RunOptions& o) {
   auto s = files::load_scene(o.scene_path, o.overrides);
   if (!s) return s;
+  if (!(o.duration_s <= 1e9)) return Problems{{"--duration", "must be at most 1e9 s"}};
   if (o.duration_s > 0) s.value().duration_s = o.duration_s;
-  for (const auto& w : scene::warnings(s.value())) spdlog::warn("{}: {}", o.scene_path, w);
+  if (s.value().duration_s / s.value().dynamics.dt_s > 1e15)
+    return Problems{{o.scene_path, "duration_s / dynamics.dt_s must be at most 1e15 steps"}};
   return s;
 }
 

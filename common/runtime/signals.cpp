@@ -11,6 +11,7 @@ sigset_t stop_signals() {
   sigemptyset(&s);
   sigaddset(&s, SIGINT);
   sigaddset(&s, SIGTERM);
+  sigaddset(&s, SIGHUP);
   return s;
 }
 }  // namespace

@@ -7,6 +7,7 @@ namespace hamel::scene {
 Problems problems(const DynamicsOptions& o) {
   Rules r("dynamics.");
   r.positive("dt_s", o.dt_s);
+  if (o.dt_s > 0) r.must(o.dt_s >= 1e-9, "dt_s", o.dt_s, ">= 1e-9");
   r.within("alpha", o.alpha, 0, 1);
   r.within("stages", o.stages, 1, 8);
   r.not_negative("tolerance_Nm", o.tolerance_Nm);

@@ -204,10 +204,18 @@ Problems problems(const Scene& s) {
   return all;
 }
 
+std::uint64_t fingerprint(const Scene& s) {
+  std::uint64_t h = 1469598103934665603ull;  // FNV-1a
+  for (const std::string* text : {&s.text, &s.robot.urdf})
+    for (const char c : *text + '\0') h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return h;
+}
+
 std::vector<std::string> warnings(const Scene& s) {
   std::vector<std::string> out = s.robot.warnings;
   const PlannerOptions& o = s.planner;
-  const double closing = o.vmax_mps + top_speed_mps(s.perception);  // the barrier needs g rho0 >= it
+  const double closing = std::min(o.vmax_mps, o.barrier_gain * o.rho0_m) +
+                         top_speed_mps(s.perception);  // the barrier needs g rho0 >= it
   if (s.steered && o.method == Method::gyro && o.barrier_gain > 0 && o.barrier_gain * o.rho0_m < closing)
     out.push_back("planner.barrier_gain * rho0_m = " + number(o.barrier_gain * o.rho0_m) +
                   " m/s is below the largest closing speed " + number(closing) +

@@ -112,6 +112,9 @@ struct Scene {
 Problems problems(const Scene& s);
 Problems problems(const PerceptionOptions& o);
 
+/// A number of the scene's text and robot: what a checkpoint of a run must agree with.
+std::uint64_t fingerprint(const Scene& s);
+
 /// What is allowed but probably not meant: the robot's warnings and settings that undo each other.
 std::vector<std::string> warnings(const Scene& s);
 

@@ -20,14 +20,6 @@ runtime::Clock::duration seconds(double s) {
   return std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(s));
 }
 
-/// FNV-1a of what a checkpoint must agree with: the scene as it was loaded.
-std::uint64_t fingerprint(const scene::Scene& s) {
-  std::uint64_t h = 1469598103934665603ull;
-  for (const char c : s.text + '\0' + s.robot.urdf)
-    h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return h;
-}
-
 /// A fresh start must not be taken for the continuation of an earlier run of this arm.
 std::uint64_t fresh_incarnation(scene::Pace pace) {
   if (pace == scene::Pace::lockstep) return 1;
@@ -75,7 +67,7 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
     : scene_(scene),
       config_(config),
       arm_(scene_),
-      fingerprint_(fingerprint(scene)),
+      fingerprint_(scene::fingerprint(scene)),
       incarnation_(config.incarnation != 0 ? config.incarnation : fresh_incarnation(config.pace)),
       state_out_(node),
       clock_out_(node),
@@ -159,8 +151,26 @@ bool DynamicsService::accept(const wire::TorqueCommand& c) {
                    command_.size());
     return false;
   }
-  if (c.state_incarnation != incarnation_ || c.step > arm_.state().step || c.epoch < epoch_) return false;
-  return !command_step_ || c.step > *command_step_;
+  if (c.state_incarnation != incarnation_ || c.step > arm_.state().step) return false;
+  if (command_step_ && c.step <= *command_step_) return false;
+  return c.epoch >= epoch_ || owner_is_silent();
+}
+
+/// True when the planner that holds the arm has not been heard for longer than a command stays fresh: another
+/// may take over, whatever its epoch.
+bool DynamicsService::owner_is_silent() const {
+  if (!command_step_) return true;
+  if (config_.pace == scene::Pace::lockstep) return runtime::Clock::now() - waiting_since_ > 1s;
+  return command_age_s() > command_stale_s();
+}
+
+double DynamicsService::command_age_s() const {
+  return static_cast<double>(arm_.state().step - *command_step_) * scene_.dynamics.dt_s;
+}
+
+double DynamicsService::command_stale_s() const {
+  return std::max(std::chrono::duration<double>(topics::kCommand.stale).count(),
+                  3 * scene_.planner.period_steps * scene_.dynamics.dt_s);
 }
 
 bool DynamicsService::awaits_command() const {
@@ -239,10 +249,7 @@ Drive DynamicsService::choose_drive() {
     validity_ = wire::Validity::holding;
     return {.kind = DriveKind::hold};
   }
-  const double age_s = static_cast<double>(arm_.state().step - *command_step_) * scene_.dynamics.dt_s;
-  const double stale_s = std::max(std::chrono::duration<double>(topics::kCommand.stale).count(),
-                                  3 * scene_.planner.period_steps * scene_.dynamics.dt_s);
-  if (config_.pace == scene::Pace::realtime && age_s > stale_s) {
+  if (config_.pace == scene::Pace::realtime && command_age_s() > command_stale_s()) {
     ++commands_missed_;
     validity_ = wire::Validity::command_stale;
     return {.kind = DriveKind::hold};

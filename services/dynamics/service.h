@@ -50,6 +50,9 @@ class DynamicsService final : public runtime::Service {
   bool poll_lockstep(Time now);
   bool poll_realtime(Time now);
   void count_lateness(Time now);
+  bool owner_is_silent() const;
+  double command_age_s() const;
+  double command_stale_s() const;
   bool awaits_command() const;
   bool at_end() const;
   Drive choose_drive();

@@ -59,6 +59,7 @@ bool PerceptionService::hear_clock(Time now) {
     if (again) ++repeated_;
     if (again || anew) next_.reset();
     clock_ = c;
+    set_.incarnation = c.incarnation;  // sets of an earlier run of the arm are none of this one
     clock_heard_ = now;
     heard = true;
   }
@@ -100,7 +101,8 @@ std::uint64_t PerceptionService::after(std::uint64_t k) const {
 }
 
 runtime::Clock::time_point PerceptionService::due() const {
-  if (!clock_ || !clock_->running || clock_->pace == wire::Pace::lockstep || !next_)
+  if (!clock_ || !clock_->running || clock_->pace == wire::Pace::lockstep || !next_ ||
+      runtime::Clock::now() - clock_heard_ > topics::kClock.stale)
     return last_status_ + 500ms;
   const double wait_s = static_cast<double>(*next_) * source_.period_s() - clock_->t_s;
   const auto next = clock_heard_ + std::chrono::duration_cast<runtime::Clock::duration>(

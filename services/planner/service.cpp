@@ -46,6 +46,7 @@ Result<std::unique_ptr<PlannerService>, Problem> PlannerService::make(bus::Node&
 PlannerService::PlannerService(bus::Node& node, const scene::Scene& scene, const ServiceConfig& config)
     : scene_(scene),
       config_(config),
+      fingerprint_(scene::fingerprint(scene)),
       planner_(scene_.robot, scene_.planner),
       output_(planner_.output()),
       goal_(scene.goal),
@@ -78,7 +79,9 @@ bool PlannerService::poll(Time now) {
   return heard || planned;
 }
 
-runtime::Clock::time_point PlannerService::due() const { return last_report_ + 100ms; }
+runtime::Clock::time_point PlannerService::due() const {
+  return std::max(last_report_, last_silence_) + 100ms;
+}
 
 void PlannerService::take_goals() {
   wire::Goal g;
@@ -98,7 +101,7 @@ void PlannerService::take_modes() {
     if (m.mode == wire::Mode::stop || m.mode == wire::Mode::hold) {
       mode_ = m.mode;
     } else {
-      mode_.reset();
+      if (m.mode == wire::Mode::resume) mode_.reset();
       // From rest again, without the clocks and faults of before: the goal is as new.
       planner_.clear_goal();
       if (goal_) planner_.set_goal(*goal_);
@@ -119,6 +122,12 @@ bool PlannerService::take_states(Time now) {
     if (s.position.size() != q_.size()) {
       if (refusals_(now))
         spdlog::warn("state with {} joints refused: arm {} has {}", s.position.size(), scene_.arm, q_.size());
+      continue;
+    }
+    // Two arms of one key: the one that began last is the arm, as long as it is heard.
+    if (incarnation_ && s.incarnation < *incarnation_ && now - last_state_ < 1s) {
+      if (refusals_(now))
+        spdlog::warn("another arm {} speaks on this domain (an earlier run?); not heard", s.arm);
       continue;
     }
     heard = true;
@@ -232,7 +241,8 @@ void PlannerService::publish_report(Time now, bool always) {
 
 /// Nothing to plan for: still say so, ten times a second.
 void PlannerService::report_silence(Time now) {
-  if (now - last_report_ < 100ms) return;
+  if (now - last_report_ < 100ms || now - last_silence_ < 100ms) return;
+  last_silence_ = now;
   const bool lockstep = config_.pace == scene::Pace::lockstep;
   report_.reason = wire::Reason::none;
   if (!have_state_) {
@@ -279,7 +289,7 @@ void PlannerService::close() { publish_status(runtime::Clock::now(), wire::Servi
 void PlannerService::save() {
   if (!checkpoint_ || !incarnation_ || !memory_step_) return;
   runtime::Packer p(packed_);
-  p.put(static_cast<std::uint64_t>(q_.size()));
+  p.put(fingerprint_);
   p.put(epoch_);
   p.put(*incarnation_);
   p.put(*memory_step_);
@@ -301,14 +311,14 @@ void PlannerService::save() {
 
 bool PlannerService::load(std::span<const std::byte> bytes) {
   runtime::Unpacker u(bytes);
-  std::uint64_t n = 0, epoch = 0, incarnation = 0, step = 0, mode_id = 0;
+  std::uint64_t print = 0, epoch = 0, incarnation = 0, step = 0, mode_id = 0;
   std::int64_t mode = -1;
   SavedGoal g;
   Eigen::VectorXd joints;
   auto memory = std::make_unique<Memory>();
-  const bool whole = u.get(n) && u.get(epoch) && u.get(incarnation) && u.get(step) && u.get(mode) &&
+  const bool whole = u.get(print) && u.get(epoch) && u.get(incarnation) && u.get(step) && u.get(mode) &&
                      u.get(mode_id) && u.get(g) && u.get_doubles(joints) && u.get(*memory) && u.at_end();
-  if (!whole || n != static_cast<std::uint64_t>(q_.size())) return false;
+  if (!whole || print != fingerprint_) return false;
   epoch_ = epoch + 1;
   incarnation_ = incarnation;
   memory_step_ = step;

@@ -51,6 +51,7 @@ class PlannerService final : public runtime::Service {
 
   const scene::Scene scene_;
   const ServiceConfig config_;
+  const std::uint64_t fingerprint_;
   Planner planner_;
   Output output_;
   std::uint64_t epoch_ = 1;
@@ -82,7 +83,7 @@ class PlannerService final : public runtime::Service {
   wire::PlannerState shown_ = wire::PlannerState::idle;
   wire::Reason shown_reason_ = wire::Reason::none;
   double cycle_s_ = 0;
-  Time last_state_{}, last_report_{}, last_status_{}, last_sync_{};
+  Time last_state_{}, last_report_{}, last_silence_{}, last_status_{}, last_sync_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
   runtime::RateLimit refusals_;

@@ -126,7 +126,7 @@ Residual MidpointStep<G>::backward(const VectorXd& d) noexcept {
     r_[i] = p - turn - from_->p[i] - push;
     p_next_[i] = p + turn + push;
     const double scale = std::abs(from_->p[i]) + parts.along(k) + std::abs(rotor) + std::abs(turn) +
-                         std::abs(push) + h_ * k.weight + kNothing;
+                         std::abs(push) + h_ * (k.weight + kQuiet * chain_.energy_scale) + kNothing;
     const double size = std::abs(r_[i]);
     poison += size;
     largest = std::max(largest, size);

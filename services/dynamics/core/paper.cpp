@@ -88,7 +88,7 @@ Residual PaperStep<G>::evaluate(const VectorXd& d) noexcept {
     const double p = p_[i] + k.armature * d[i] / h_, push = 0.5 * h_ * force(i, d[i]);
     r_[i] = p - from_->p[i] - push;
     const double scale = std::abs(from_->p[i]) + parts.along(k) + k.armature * std::abs(d[i]) / h_ +
-                         std::abs(push) + h_ * k.weight + kNothing;
+                         std::abs(push) + h_ * (k.weight + kQuiet * chain_.energy_scale) + kNothing;
     if (!std::isfinite(r_[i])) return {r_[i], r_[i]};
     worst.torque_Nm = std::max(worst.torque_Nm, std::abs(r_[i]) / h_);
     worst.relative = std::max(worst.relative, std::abs(r_[i]) / scale);

@@ -14,6 +14,10 @@ namespace hamel::dynamics {
 /// through it on its way to the denormal numbers, where no relative measure holds.
 inline constexpr double kNothing = 1e-120;
 
+/// Share of gravity's impulse on the whole arm that is nothing at any joint: an arm that is held still moves
+/// by the rounding of the torque that holds it, also at joints on which gravity has no lever.
+inline constexpr double kQuiet = 1e-10;
+
 inline double norm1(const lie::Vec3<double>& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 inline double norm1(const lie::Vec2<double>& v) { return std::abs(v.x) + std::abs(v.y); }
 inline double norm1(double v) { return std::abs(v); }
