@@ -82,7 +82,7 @@ class Unpacker {
     std::uint64_t n = 0;
     if (!get(n) || n > in_.size() / sizeof(double)) return false;
     v.resize(static_cast<decltype(v.size())>(n));
-    __builtin_memcpy(v.data(), in_.data(), n * sizeof(double));
+    if (n > 0) __builtin_memcpy(v.data(), in_.data(), n * sizeof(double));
     in_ = in_.subspan(n * sizeof(double));
     return true;
   }
