@@ -1,7 +1,7 @@
 #pragma once
 /// One cycle of reactive planning: where the arm and the obstacles are now, which torque steers it.
 ///
-/// Eqs. (17)-(21) of the paper and what makes them safe (../shared/design/planner.md, cited as "1.x"):
+/// Eqs. (17)-(21) of the paper and what makes them safe (numbers like "1.5" are those of the planner design):
 ///   tau = attraction (17) - bj M qd + forces of the obstacles.
 /// The torque EXCLUDES gravity; who applies it adds the compensation.
 
