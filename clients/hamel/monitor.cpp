@@ -167,7 +167,6 @@ void Monitor::show(Time now) {
   last_shown_ = now;
   shown_t_s_ = state_ ? state_->t_s : 0;
   shown_states_ = states_;
-  shown_reports_ = reports_;
 }
 
 namespace {

@@ -86,7 +86,7 @@ class Monitor final : public runtime::Service {
   int restarts_ = 0;
   Time began_{}, last_heard_{}, final_heard_{}, last_shown_{}, ended_{};
   double shown_t_s_ = 0;
-  std::uint64_t states_ = 0, reports_ = 0, shown_states_ = 0, shown_reports_ = 0;
+  std::uint64_t states_ = 0, reports_ = 0, shown_states_ = 0;
   bool finished_ = false;
 };
 

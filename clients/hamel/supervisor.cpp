@@ -25,7 +25,6 @@ void Supervisor::add(std::string name, std::vector<std::string> command, bool en
   c.command = std::move(command);
   c.ends_by_itself = ends_by_itself;
   children_.push_back(std::move(c));
-  quick_deaths_.push_back(0);
 }
 
 void Supervisor::start(Child& c, Clock::time_point now) {
@@ -58,7 +57,6 @@ void Supervisor::start(Child& c, Clock::time_point now) {
 }
 
 void Supervisor::died(Child& c, int status, Clock::time_point now) {
-  const auto i = static_cast<std::size_t>(&c - children_.data());
   c.pid = -1;
   c.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   if (c.ends_by_itself && (c.exit_code == 0 || c.exit_code == 1 || c.exit_code == 3)) {
@@ -67,13 +65,13 @@ void Supervisor::died(Child& c, int status, Clock::time_point now) {
   }
   const std::string how = WIFEXITED(status) ? "exit code " + std::to_string(c.exit_code)
                                             : std::string("signal ") + strsignal(WTERMSIG(status));
-  quick_deaths_[i] = now - c.started < 2s ? quick_deaths_[i] + 1 : 0;
-  if (c.exit_code == kBadInputCode || quick_deaths_[i] >= kQuickDeaths) {
+  c.quick_deaths = now - c.started < 2s ? c.quick_deaths + 1 : 0;
+  if (c.exit_code == kBadInputCode || c.quick_deaths >= kQuickDeaths) {
     spdlog::error("{} died ({}); giving it up", c.name, how);
     c.done = c.given_up = true;
     return;
   }
-  c.restart_at = now + (quick_deaths_[i] > 1 ? 500ms : 0ms);
+  c.restart_at = now + (c.quick_deaths > 1 ? 500ms : 0ms);
   ++c.restarts;
   spdlog::warn("{} died ({}); starting it again", c.name, how);
 }

@@ -18,6 +18,7 @@ class Supervisor {
     std::vector<std::string> command;
     pid_t pid = -1;  ///< -1: not running
     int restarts = 0;
+    int quick_deaths = 0;         ///< in a row, each within two seconds of its start
     bool ends_by_itself = false;  ///< its end with 0, 1 or 3 is the end of its job
     bool given_up = false;
     bool done = false;  ///< ended as it should, or given up
@@ -42,7 +43,6 @@ class Supervisor {
   void start(Child& c, Clock::time_point now);
   void died(Child& c, int status, Clock::time_point now);
   std::vector<Child> children_;
-  std::vector<int> quick_deaths_;
 };
 
 }  // namespace hamel::client
