@@ -164,7 +164,7 @@ TEST_P(Variational, OrderShowsInRichardsonSlopes) {
     const auto at = [&](int steps) { return travel(chain, o.options, q, qd, tau, 0.2, steps); };
     const VectorXd coarse = at(o.steps), middle = at(2 * o.steps), fine = at(4 * o.steps);
     const double slope = std::log2((coarse - middle).norm() / (middle - fine).norm());
-    EXPECT_NEAR(slope, o.order, 0.15) << test::name(o.options.tier) << " alpha " << o.options.alpha;
+    EXPECT_NEAR(slope, o.order, o.order < 6 ? 0.15 : 0.2) << test::name(o.options.tier) << " alpha " << o.options.alpha;
   }
 }
 
