@@ -2,8 +2,8 @@
 /// The removable singularities of rotation formulas, all in one home.
 ///
 /// Each function takes x = theta^2 >= 0 and is analytic at 0.  Below kSwitch a power series is summed, above
-/// it the closed form in half angles.  Relative error against long double over 0.1..5: at most 8 eps for the
-/// sines and cosines, 20 eps for cotc just above the switch (tests/property/lie_test.cpp).
+/// it the closed form in half angles.  Relative error against long double over 0.1..5: at most 8 eps
+/// (tests/property/lie_test.cpp).
 
 #include <array>
 #include <cmath>
@@ -15,6 +15,9 @@ namespace hamel::lie {
 inline constexpr double kSwitch = 0.5;
 /// The same for coefficients of higher order, whose closed forms cancel more; eighteen terms.
 inline constexpr double kWideSwitch = 9.0;
+
+/// The same for cotc, whose closed form cancels up to theta = 2; twenty-four terms.
+inline constexpr double kCotSwitch = 4.0;
 
 template <std::size_t N>
 constexpr double horner(const std::array<double, N>& c, double x) noexcept {
@@ -76,20 +79,48 @@ inline double sinc5(double x) noexcept {
   return (x * t / 6 + std::sin(t) - t) / (x * x * t);
 }
 
-/// (1 - (theta/2) cot(theta/2)) / theta^2.  Series coefficients |B_2k| / (2k)!.  Pole at theta = 2 pi.
+/// |B_2k| / (2k)! = 2 zeta(2k) / (2 pi)^2k for k = 1, 2, ...: the coefficients of cotc.
+constexpr std::array<double, 24> cotc_coefficients() noexcept {
+  std::array<double, 24> c{1. / 12,
+                           1. / 720,
+                           1. / 30240,
+                           1. / 1209600,
+                           1. / 47900160,
+                           691. / 1307674368000.,
+                           1. / 74724249600.,
+                           3617. / 10670622842880000.,
+                           43867. / 5109094217170944000.};
+  constexpr double four_pi_squared = 39.478417604357434475;
+  double power = 1;  // (2 pi)^2k
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    power *= four_pi_squared;
+    if (i < 9) continue;
+    double zeta = 1;
+    for (int m = 2; m < 8; ++m) {
+      double inverse = 1;
+      for (std::size_t k = 0; k <= i; ++k) inverse /= m * m;
+      zeta += inverse;
+    }
+    c[i] = 2 * zeta / power;
+  }
+  return c;
+}
+
+/// (1 - (theta/2) cot(theta/2)) / theta^2.  Pole at theta = 2 pi k, k >= 1.
 inline double cotc(double x) noexcept {
-  static constexpr std::array<double, 9> c = {1. / 12,
-                                              1. / 720,
-                                              1. / 30240,
-                                              1. / 1209600,
-                                              1. / 47900160,
-                                              691. / 1307674368000.,
-                                              1. / 74724249600.,
-                                              3617. / 10670622842880000.,
-                                              43867. / 5109094217170944000.};
-  if (x < kSwitch) return horner(c, x);
+  static constexpr auto c = cotc_coefficients();
+  if (x < kCotSwitch) return horner(c, x);
   const double h = 0.5 * std::sqrt(x);
   return (1 - h * std::cos(h) / std::sin(h)) / x;
+}
+
+/// How near the inverse of dexp is to a pole: its condition |theta/2 / sin(theta/2)|, 1 at theta = 0,
+/// infinite at a pole theta = 2 pi k, k >= 1.  Digits lost there are log10 of it.
+inline double pole_condition(double x) noexcept {
+  if (x < kSwitch) return 1 / sinc(0.25 * x);
+  const double h = 0.5 * std::sqrt(x), s = std::sin(h);
+  // 2 pi k is no double: what rounding of theta hides counts as the pole
+  return std::abs(s) <= 1e-15 * h ? HUGE_VAL : std::abs(h / s);
 }
 
 }  // namespace hamel::lie

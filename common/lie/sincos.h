@@ -1,7 +1,7 @@
 #pragma once
 /// Sine and cosine together, for any scalar of the recursions: a number, or numbers side by side.
 ///
-/// Cody and Waite's reduction by pi/2 in three parts, then the kernels of [fdlibm]: at most 1.5 ulp for
+/// Cody and Waite's reduction by pi/2 in three parts, then the kernels of [fdlibm]: at most 2.5 ulp for
 /// |x| < 1.6e6, which tests/property/lie_test.cpp measures; the C library's beyond.  Sums and products only,
 /// in one order: every lane of a pack gets the bits that a number alone would get.
 

@@ -158,6 +158,14 @@ double kinetic_energy(const model::Chain& chain, const Workspace& ws, Ref<const 
   return 0.5 * twice;
 }
 
+Wrench momentum_W(const model::Chain& chain, const Workspace& ws) noexcept {
+  Wrench sum = Wrench::Zero();
+  for (int i = 0; i < chain.n(); ++i) {
+    sum += lie::Ad_inv_T(ws.X_WB[at(i)], Wrench(spatial_inertia(chain.link(i).inertia) * ws.V_B[at(i)]));
+  }
+  return sum;
+}
+
 double potential_energy(const model::Chain& chain, const Workspace& ws) noexcept {
   double U = 0;
   for (int i = 0; i < chain.n(); ++i) {

@@ -146,8 +146,10 @@ template <class S>
 [[gnu::always_inline]] inline NoAttitude attitude(const PlanarFrame<S>&, const NoAttitude*) {
   return {};
 }
-[[gnu::always_inline]] inline const Half3<double>& in_link_axes(NoAttitude, const Half3<double>& F_E) {
-  return F_E;
+template <class S>
+[[gnu::always_inline]] inline void add_in_link_axes(NoAttitude, const Half3<double>& F_E, Half3<S>& F) {
+  F.a = F.a + F_E.a;
+  F.l.x = F.l.x + F_E.l.x, F.l.y = F.l.y + F_E.l.y;
 }
 template <class S>
 [[gnu::always_inline]] inline Half3<S> momentum(const PlanarLink& k, const PlanarFrame<S>& X,

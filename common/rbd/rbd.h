@@ -60,6 +60,10 @@ void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<cons
                       Ref<const VectorXd> tau, Workspace& ws, Ref<VectorXd> qdd) noexcept;
 /// Kinetic energy [J], armature included.  Needs velocities().
 double kinetic_energy(const model::Chain& chain, const Workspace& ws, Ref<const VectorXd> qd) noexcept;
+/// Momentum map: momentum of the whole arm in world axes, angular about the world's origin.  Armature left
+/// out.  Needs velocities().  Its component along joint 1's screw is p_1, which stays without gravity and
+/// torque.
+lie::Wrench momentum_W(const model::Chain& chain, const Workspace& ws) noexcept;
 /// Potential energy [J] -sum m g . r, zero at the world's origin.
 double potential_energy(const model::Chain& chain, const Workspace& ws) noexcept;
 /// The energy scale of agreements: sum m_i |g| r_i, r_i the sum of joint-to-joint offsets up to the centre of

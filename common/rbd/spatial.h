@@ -129,8 +129,8 @@ template <class S>
   return parent ? *parent * X.R : X.R;
 }
 template <class S>
-[[gnu::always_inline]] inline Half6<S> in_link_axes(const Mat3<S>& R, const Half6<double>& F_W) {
-  return {transpose_times(R, F_W.a), transpose_times(R, F_W.l)};
+[[gnu::always_inline]] inline void add_in_link_axes(const Mat3<S>& R, const Half6<double>& F_W, Half6<S>& F) {
+  F = F + Half6<S>{transpose_times(R, F_W.a), transpose_times(R, F_W.l)};
 }
 /// I V: momentum of a link.
 template <class S>

@@ -84,7 +84,7 @@ template <class G, class S>
   for (int i = 0; i < chain.n(); ++i) R[i] = attitude(X[i], i > 0 ? &R[i - 1] : nullptr);
   typename G::template Motion<S> F{};
   for (int i = chain.n(); i-- > 0;) {
-    F = F + in_link_axes(R[i], wrench[i]);
+    add_in_link_axes(R[i], wrench[i], F);
     Q[i] = along(chain[i], X[i], F);
     if (i > 0) F = to_parent(X[i], F);
   }

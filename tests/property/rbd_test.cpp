@@ -62,6 +62,23 @@ TEST_P(Rbd, KineticEnergyIsHalfOfMassTimesSpeedSquared) {
   EXPECT_NEAR(0.5 * qd.dot(M * qd), T, 1e-13 * T);
 }
 
+TEST_P(Rbd, MomentumMapAlongTheFirstScrewIsTheFirstMomentum) {
+  velocities(chain, q, qd, ws);
+  mass_matrix(chain, ws, M);
+  const double p1 = (M.row(0) * qd).value() - chain.joint(0).armature * qd[0];
+  const lie::Twist screw = lie::Ad(ws.X_WB[0], chain.A_B(0));
+  const lie::Wrench h = momentum_W(chain, ws);
+  EXPECT_NEAR(screw.dot(h), p1, 1e-11 * (1 + h.norm() * screw.norm()));
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();  // mass times velocity of every centre of mass
+  for (int i = 0; i < n; ++i) {
+    const std::size_t s = static_cast<std::size_t>(i);
+    const lie::Twist& V = ws.V_B[s];
+    linear += chain.link(i).inertia.mass_kg *
+              (ws.X_WB[s].R * (V.tail<3>() + V.head<3>().cross(chain.link(i).inertia.com_m)));
+  }
+  EXPECT_LT((h.tail<3>() - linear).norm(), 1e-12 * (1 + linear.norm()));
+}
+
 TEST_P(Rbd, GravityTorqueIsTheSlopeOfPotentialEnergy) {
   positions(chain, q, ws);
   gravity_torque(chain, ws, tau);

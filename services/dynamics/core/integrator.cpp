@@ -43,21 +43,34 @@ rbd::Half3<double> in_axes(const rbd::PlanarChain& chain, const lie::Wrench& F_W
   return {chain.R_WE.col(2).dot(F_W.head<3>()), {force.x(), force.y()}};
 }
 
+/// Two bodies as one.
+model::Inertia together(const model::Inertia& a, const model::Inertia& b) {
+  const double mass = a.mass_kg + b.mass_kg;
+  if (!(mass > 0)) return a;
+  const Eigen::Vector3d com = (a.mass_kg * a.com_m + b.mass_kg * b.com_m) / mass, r = b.com_m - a.com_m;
+  const Eigen::Matrix3d apart = r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose();
+  return {mass, com, a.about_com_kgm2 + b.about_com_kgm2 + a.mass_kg * b.mass_kg / mass * apart};
+}
+
 }  // namespace
 
 /// What the integrator asks of an arm, whatever the group.
 class Integrator::Impl {
  public:
-  Impl(const model::Chain& c, const Options& o) : chain(c), options(o), ws(chain) {}
+  Impl(const model::Chain& c, const Options& o) : bare(c), chain(c), options(o), ws(chain) {}
   virtual ~Impl() = default;
   virtual State start(const VectorXd& q0, const VectorXd& qd0) const = 0;
   virtual StepReport step(State& state, const VectorXd& tau) noexcept = 0;
   virtual double energy(const State& state) noexcept = 0;
   virtual void set_wrench(int link, const lie::Wrench& F_W) noexcept = 0;
   virtual void clear_wrenches() noexcept = 0;
+  virtual void reweigh(State& state) noexcept = 0;
+  virtual void between(const State& before, const State& after, double share, VectorXd& q,
+                       VectorXd& qd) noexcept = 0;
   virtual Space space() const noexcept = 0;
 
-  const model::Chain chain;
+  const model::Chain bare;  ///< without payload
+  model::Chain chain;
   const Options options;
   rbd::Workspace ws;
 };
@@ -84,6 +97,14 @@ class Arm final : public Integrator::Impl {
   void clear_wrenches() noexcept override {
     for (auto& F : load_.wrench) F = {};
     load_.pushed = false;
+  }
+  void reweigh(State& state) noexcept override {
+    axis_.assign(chain);
+    marcher_.reweigh(state);
+  }
+  void between(const State& before, const State& after, double share, VectorXd& q,
+               VectorXd& qd) noexcept override {
+    marcher_.between(before, after, share, q, qd);
   }
   Space space() const noexcept override { return std::is_same_v<G, SE2> ? Space::automatic : Space::se3; }
 
@@ -116,6 +137,29 @@ void Integrator::set_wrench(int link, const lie::Wrench& F_W) noexcept {
   impl_->set_wrench(link, F_W);
 }
 void Integrator::clear_wrenches() noexcept { impl_->clear_wrenches(); }
+
+Problems Integrator::set_payload(const model::Inertia& body_E, State& state) {
+  if (!(body_E.mass_kg >= 0) || !body_E.com_m.allFinite() || !body_E.about_com_kgm2.allFinite())
+    return {{"payload", "needs a mass >= 0 and finite numbers"}};
+  model::ChainSpec spec = impl_->bare.spec();
+  const lie::Pose& X_NE = spec.X_NE;
+  const model::Inertia body_N{body_E.mass_kg, X_NE * body_E.com_m,
+                              X_NE.R * body_E.about_com_kgm2 * X_NE.R.transpose()};
+  model::Inertia& last = spec.links.back().inertia;
+  last = together(last, body_N);
+  auto laden = model::build(std::move(spec));
+  if (!laden) return laden.error();
+  impl_->chain = laden.value();
+  impl_->ws.axis.assign(impl_->chain);
+  impl_->reweigh(state);
+  return {};
+}
+
+void Integrator::between(const State& before, const State& after, double share, VectorXd& q,
+                         VectorXd& qd) noexcept {
+  assert(q.size() == chain().n() && qd.size() == chain().n() && share >= 0 && share <= 1);
+  impl_->between(before, after, share, q, qd);
+}
 
 void Integrator::gravity_torque(const VectorXd& q, VectorXd& tau_g) noexcept {
   assert(tau_g.size() == q.size());

@@ -66,6 +66,15 @@ class Integrator {
   /// work is in the report.  Not part of State: who resumes sets it again.
   void set_wrench(int link, const lie::Wrench& F_W) noexcept;
   void clear_wrenches() noexcept;
+  /// From now on the end effector holds a body, given in the end effector's axes; mass 0: none.  q and qd of
+  /// `state` stay, its momentum becomes M qd of the laden arm.  Returns what is wrong with the body and
+  /// changes nothing then. Allocates.  Not part of State: who resumes sets it again.
+  Problems set_payload(const model::Inertia& body_E, State& state);
+  /// q and qd at `share` in [0, 1] of the way between two states one step apart.  Tier gauss, step not
+  /// divided: the collocation polynomials of q and p, error O(h^{s+1}) between the ends; else the cubic
+  /// through q and qd at both ends, O(h^4).  No allocation; q and qd of size n.
+  void between(const State& before, const State& after, double share, Eigen::VectorXd& q,
+               Eigen::VectorXd& qd) noexcept;
   /// Torque that holds the arm against gravity at q.
   void gravity_torque(const Eigen::VectorXd& q, Eigen::VectorXd& tau_g) noexcept;
   /// E(q, p) [J].

@@ -19,7 +19,13 @@ constexpr double kDrift = 0.25, kDriftLimit = 0.5, kTrickle = 1e-3;
 
 template <class G>
 Marcher<G>::Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier)
-    : chain_(chain), options_(options), tier_(std::move(tier)), now_(chain), next_(chain) {
+    : chain_(chain),
+      options_(options),
+      tier_(std::move(tier)),
+      now_(chain),
+      next_(chain),
+      q_(now_.q),
+      p_(now_.q) {
   now_.history.assign(tier_->history_size(), 0);
   next_.history = now_.history;
 }
@@ -153,6 +159,36 @@ template <class G>
 double Marcher<G>::energy(const State& s) noexcept {
   load_state(s);
   return now_.energy_J;
+}
+
+template <class G>
+void Marcher<G>::reweigh(State& s) noexcept {
+  loaded_ = false;
+  if (!acceptable(s)) return;
+  next_.place(chain_, s.q);
+  next_.move_with_velocity(chain_, s.qd);
+  s.p = next_.p;
+}
+
+template <class G>
+void Marcher<G>::between(const State& before, const State& after, double share, VectorXd& q,
+                         VectorXd& qd) noexcept {
+  if (!acceptable(before) || !acceptable(after)) return;
+  const double h = options_.dt_s;
+  next_.q = after.q, next_.p = after.p;
+  std::copy_n(after.history.begin(), next_.history.size(), next_.history.begin());
+  if (tier_->interpolate(next_, (1 - share) * h, q_, p_)) {
+    next_.place(chain_, q_);
+    next_.move_with_momentum(chain_, p_);
+    q = next_.q, qd = next_.qd;
+    return;
+  }
+  const double t = share, u = 1 - share;
+  for (int i = 0; i < chain_.n(); ++i) {
+    const double d = after.q[i] - before.q[i], a = h * before.qd[i], b = h * after.qd[i];
+    q[i] = before.q[i] + t * t * (3 - 2 * t) * d + t * u * (u * a - t * b);
+    qd[i] = (6 * t * u * d + u * (1 - 3 * t) * a + t * (3 * t - 2) * b) / h;
+  }
 }
 
 template class Marcher<SE3>;

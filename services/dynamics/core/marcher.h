@@ -26,6 +26,10 @@ class Marcher {
   /// Integrator::step() for an acceptable state.
   StepReport step(State& s, const Load<G>& load) noexcept;
   double energy(const State& s) noexcept;
+  /// The chain has got other inertias: p follows from q and qd.
+  void reweigh(State& s) noexcept;
+  /// Integrator::between().
+  void between(const State& before, const State& after, double share, VectorXd& q, VectorXd& qd) noexcept;
 
  private:
   void load_state(const State& s) noexcept;
@@ -39,6 +43,7 @@ class Marcher {
   const Options& options_;
   std::unique_ptr<TierStep<G>> tier_;
   Node<G> now_, next_;
+  VectorXd q_, p_;  ///< scratch
   Ledger ledger_;
   bool loaded_ = false;
 };

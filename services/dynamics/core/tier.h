@@ -57,6 +57,12 @@ class TierStep {
   /// One undivided step of h seconds, `from` to `to`, history included.  `to` means nothing when not
   /// usable().
   virtual StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept = 0;
+  /// q and p `back` seconds before `end`, inside the step that led there; false when the tier keeps no
+  /// polynomial.
+  virtual bool interpolate(const Node<G>& end, double back, VectorXd& q, VectorXd& p) const noexcept {
+    (void)end, (void)back, (void)q, (void)p;
+    return false;
+  }
 };
 
 /// Torque of the smooth hard stops: nothing inside the limits, stiffness times excess outside [N m or N].
