@@ -10,8 +10,8 @@
 /// where dL/dq_i = A_i^T (ad_{V_i}^T h_i + w_i), composite momentum and weight as in midpoint.h.
 /// Solved by fixed-point iteration (Anderson's acceleration saved 6 % of the iterations at most: left out)
 /// from the extrapolated polynomials of the last step; all stages of an iteration side by side in SIMD lanes
-/// (gauss_lanes.h); O(n) a stage.  Damping is taken implicitly in the iteration, joint by joint; where it takes
-/// a joint's momentum several times over in one step (h c / D = 3) the step is still divided.
+/// (gauss_lanes.h); O(n) a stage.  Damping is taken implicitly in the iteration, joint by joint; where it
+/// takes a joint's momentum several times over in one step (h c / D = 3) the step is still divided.
 
 #include <Eigen/Core>
 #include <vector>
