@@ -31,7 +31,8 @@ struct DynamicsOptions {
   double tolerance_rel = 1e-10;  ///< dopri8: relative local error
   int max_iterations = 32;       ///< root-finding budget of one step, >= 1
   int max_subdivisions = 6;      ///< a step that does not converge is halved up to this often, 0..20
-  double stop_stiffness = 0;     ///< smooth hard stops at joint limits [N m/rad], 0: none
+  double stop_stiffness =
+      0;  ///< smooth hard stops at joint limits: k e^2/(e + 1e-3) at e beyond [N m/rad], 0: none
   Space space = Space::automatic;  ///< a planar arm is computed on SE(2), unless se3 is asked for
 };
 

@@ -32,8 +32,6 @@ Arm::Arm(const scene::Scene& scene)
   const int n = chain.n();
   tau_ = tau_gravity_ = pull_ = Eigen::VectorXd::Zero(n);
   q_hold_ = state_.q;
-  effort_.resize(n);
-  for (int i = 0; i < n; ++i) effort_[i] = chain.joint(i).limits.effort;
   gravity_works_ = gravity_works(integrator_, state_.q);
   scale_J_ = gravity_works_ ? rbd::energy_scale(chain) : 0;
   brake_per_s_ = brake_rate(options_.dt_s);
@@ -72,18 +70,8 @@ void Arm::drive_torque(const Drive& drive) noexcept {
   }
 }
 
-void Arm::saturate() noexcept {
-  saturated_ = false;
-  for (Eigen::Index i = 0; i < tau_.size(); ++i) {
-    const double cut = std::clamp(tau_[i], -effort_[i], effort_[i]);
-    saturated_ |= cut != tau_[i];
-    tau_[i] = cut;
-  }
-}
-
 bool Arm::advance(const Drive& drive) noexcept {
   drive_torque(drive);
-  saturate();
   report_ = integrator_.step(state_, tau_);
   if (!report_.usable()) return false;
   books_.work_J += report_.work_J;

@@ -46,8 +46,8 @@ class Arm {
 
   const State& state() const noexcept { return state_; }
   double t_s() const noexcept { return static_cast<double>(state_.step) * options_.dt_s; }
-  const Eigen::VectorXd& torque_applied() const noexcept { return tau_; }
-  bool torque_saturated() const noexcept { return saturated_; }
+  const Eigen::VectorXd& torque_applied() const noexcept { return integrator_.torque_applied(); }
+  bool torque_saturated() const noexcept { return report_.saturated > 0; }
   const StepReport& report() const noexcept { return report_; }
   const Books& books() const noexcept { return books_; }
   const Options& options() const noexcept { return options_; }
@@ -60,7 +60,6 @@ class Arm {
 
  private:
   void drive_torque(const Drive& drive) noexcept;
-  void saturate() noexcept;
   double kinetic_energy() const noexcept { return 0.5 * state_.p.dot(state_.qd); }
 
   Options options_;
@@ -68,9 +67,9 @@ class Arm {
   State state_;
   StepReport report_;
   Books books_;
-  Eigen::VectorXd tau_, tau_gravity_, effort_, q_hold_, pull_;
+  Eigen::VectorXd tau_, tau_gravity_, q_hold_, pull_;
   rbd::Workspace ws_;
-  bool holding_ = false, saturated_ = false, gravity_works_ = false;
+  bool holding_ = false, gravity_works_ = false;
   double scale_J_ = 0, brake_per_s_ = 0;
 };
 
