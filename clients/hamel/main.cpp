@@ -1,5 +1,6 @@
 /// hamel: the command line.
 
+#include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/figures.h"
 #include "clients/hamel/plot.h"
@@ -222,9 +223,11 @@ int verbs(int argc, char** argv) {
   const auto* figures = add_figures(app, figures_args);
 
   RecordVerbs recordings(app);
+  client::BenchVerb bench(app);
 
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   if (const auto code = recordings.run()) return *code;
+  if (const auto code = bench.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (figures->parsed()) return client::figures(figures_args);
   if (trade->parsed()) return client::trade(trade_args);
