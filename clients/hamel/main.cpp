@@ -1,5 +1,8 @@
 /// hamel: the command line.
 
+#include <cerrno>
+#include <system_error>
+
 #include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/figures.h"
@@ -106,7 +109,9 @@ class RecordVerbs {
   void add_play(CLI::App& app) {
     play_ =
         app.add_subcommand("play", "put recorded messages on the bus again, byte for byte, at their times");
-    play_->add_option("file", play_args_.path, "recording")->required()->type_name("FILE");
+    play_->add_option("file", play_args_.path, "recording (.mcap), or obstacle stream (.csv)")
+        ->required()
+        ->type_name("FILE");
     play_->add_option("--topic", play_args_.topics, "obstacles, clock, ...; repeat")
         ->allow_extra_args(false)
         ->capture_default_str();
@@ -116,6 +121,11 @@ class RecordVerbs {
     play_->add_option("--start", play_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
     play_->add_option("--until", play_args_.end_s, "up to this time of the run")->type_name("SECONDS");
     play_->add_flag("--loop", play_args_.loop, "begin anew at the end, until Ctrl-C");
+    play_->add_flag("--control", play_args_.control,
+                    "obey standard input: pause, resume, step, quit, or the keys space . q");
+    play_->add_flag("--paused", play_args_.paused, "with --control: begin paused");
+    play_->add_option("--arm", play_args_.arm, "arm whose perception a CSV stands for")
+        ->capture_default_str();
     runtime::add_bus_options(*play_, play_args_.bus);
   }
 
@@ -125,6 +135,23 @@ class RecordVerbs {
   client::LogArgs log_args_;
   CLI::App *record_, *play_, *replay_, *log_, *info_, *cat_, *csv_, *recover_;
 };
+
+CLI::App* add_plot(CLI::App& app, client::PlotArgs& a) {
+  auto* plot = app.add_subcommand("plot", "draw a run (needs gnuplot)");
+  plot->add_option("file", a.path, "recording (.mcap), or what --csv wrote")->required()->type_name("FILE");
+  plot->add_option("-o,--output", a.out_path, "picture, .svg or .png")->required()->type_name("FILE");
+  plot->add_option("--kind", a.kinds, "path, clearance, energy, iterations, latencies or all; repeat")
+      ->check(CLI::IsMember({"path", "clearance", "energy", "iterations", "latencies", "all"}))
+      ->allow_extra_args(false);
+  plot->add_option("--scene", a.scene_path,
+                   "scene of a CSV: draws arm, obstacles and target too; of a recording: instead of its own")
+      ->type_name("SCENE");
+  plot->add_option("--set", a.overrides, "overrides the run was made with")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  return plot;
+}
+
 CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
   auto* trade =
       app.add_subcommand("trade", "measure accuracy against cost of every tier on a scene's free motion");
@@ -209,13 +236,7 @@ int verbs(int argc, char** argv) {
   runtime::add_bus_options(*status, status_args.bus);
 
   client::PlotArgs plot_args;
-  auto* plot = app.add_subcommand("plot", "draw a run from the file that --csv wrote (needs gnuplot)");
-  plot->add_option("scene", plot_args.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
-  plot->add_option("csv", plot_args.csv_path, "written by --csv of that scene")->required()->type_name("CSV");
-  plot->add_option("-o,--output", plot_args.out_path, "picture, .svg or .png")->required()->type_name("FILE");
-  plot->add_option("--set", plot_args.overrides, "overrides the run was made with")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  const auto* plot = add_plot(app, plot_args);
 
   client::TradeArgs trade_args;
   const auto* trade = add_trade(app, trade_args);
@@ -248,8 +269,11 @@ int verbs(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     const int code = verbs(argc, argv);
-    if (std::fflush(stdout) == 0) return code;
+    if (std::fflush(stdout) == 0 || errno == EPIPE) return code;
     std::fputs("hamel: cannot write to standard output\n", stderr);
+  } catch (const std::system_error& e) {
+    if (e.code() == std::errc::broken_pipe) return runtime::kDone;  // the reader has had enough
+    std::fputs((std::string("hamel: ") + e.what() + "\n").c_str(), stderr);
   } catch (const std::exception& e) {
     std::fputs("hamel: ", stderr);
     std::fputs(e.what(), stderr);

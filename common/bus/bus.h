@@ -72,7 +72,9 @@ class Node {
   /// Never null; std::runtime_error with one sentence when the vendor refuses (out of memory or sockets).
   /// `topic` must outlive the node: the constants of idl/topics.h do.
   virtual std::unique_ptr<Writer> writer(const Topic& topic) = 0;
-  virtual std::unique_ptr<Reader> reader(const Topic& topic) = 0;
+  /// `depth` samples of each key wait for it, the newest; 0: as many as the topic's delivery says (a recorder
+  /// wants more).
+  virtual std::unique_ptr<Reader> reader(const Topic& topic, int depth = 0) = 0;
   /// Waits until a sample arrived or wake() was called since the last wait(), or until the deadline.
   /// True when woken.  Middleware threads only notify; user code runs here, on the owner's thread.
   virtual bool wait(std::chrono::steady_clock::time_point deadline) = 0;

@@ -162,9 +162,8 @@ Listener listener_for(Events& events) {
   return l;
 }
 
-Qos qos_for(const Topic& topic, bool writes) {
+Qos qos_for(const Topic& topic, bool writes, int depth) {
   const bool latched = topic.delivery == Delivery::latched;
-  const int depth = latched ? 1 : kStreamDepth;
   Qos q(dds_create_qos());
   dds_qset_reliability(q.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_durability(q.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
@@ -258,15 +257,17 @@ class CycloneNode final : public Node {
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
     Events& events = make_events(topic, true);
-    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic), qos_for(topic, true).get(),
-                                                listener_for(events).get());
+    const dds_entity_t made =
+        dds_create_writer(participant_, topic_for(topic),
+                          qos_for(topic, true, depth_of(topic.delivery)).get(), listener_for(events).get());
     return std::make_unique<CycloneWriter>(topic, checked(made, "writer", topic), events);
   }
 
-  std::unique_ptr<Reader> reader(const Topic& topic) override {
+  std::unique_ptr<Reader> reader(const Topic& topic, int depth) override {
     Events& events = make_events(topic, false);
-    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic), qos_for(topic, false).get(),
-                                                listener_for(events).get());
+    if (depth <= 0) depth = depth_of(topic.delivery);
+    const dds_entity_t made = dds_create_reader(
+        participant_, topic_for(topic), qos_for(topic, false, depth).get(), listener_for(events).get());
     return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events);
   }
 

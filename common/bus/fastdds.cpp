@@ -90,13 +90,13 @@ struct ReaderEvents final : Events, dds::DataReaderListener {
 
 /// The part of QoS that writers and readers share.
 template <class Qos>
-Qos common_qos(const Topic& topic) {
+Qos common_qos(const Topic& topic, int depth) {
   const bool latched = topic.delivery == Delivery::latched;
   Qos qos;
   qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
-  qos.history().depth = latched ? 1 : kStreamDepth;
+  qos.history().depth = depth;
   qos.resource_limits().max_instances = kMaxInstances;
   qos.resource_limits().max_samples_per_instance = qos.history().depth;
   qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
@@ -107,7 +107,7 @@ Qos common_qos(const Topic& topic) {
 }
 
 dds::DataWriterQos writer_qos(const Topic& topic) {
-  auto qos = common_qos<dds::DataWriterQos>(topic);
+  auto qos = common_qos<dds::DataWriterQos>(topic, depth_of(topic.delivery));
   qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
   qos.reliable_writer_qos().times.heartbeatPeriod = duration(kHeartbeat);
   qos.writer_data_lifecycle().autodispose_unregistered_instances = false;
@@ -235,9 +235,9 @@ class FastNode final : public Node {
     return std::make_unique<FastWriter>(topic, *publisher_, made, events);
   }
 
-  std::unique_ptr<Reader> reader(const Topic& topic) override {
+  std::unique_ptr<Reader> reader(const Topic& topic, int depth) override {
     auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, options_, notifier_));
-    const auto qos = common_qos<dds::DataReaderQos>(topic);
+    const auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
     auto& made = checked(subscriber_->create_datareader(&topic_for(topic), qos, &events), "reader", topic);
     return std::make_unique<FastReader>(topic, *subscriber_, made, events);
   }

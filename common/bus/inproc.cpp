@@ -21,9 +21,9 @@ namespace {
 /// The samples that wait for one reader, oldest first, at most `depth` of each key.
 class Inbox {
  public:
-  Inbox(const Topic& topic, Notifier& notifier)
-      : depth_(topic.delivery == Delivery::latched ? 1 : kStreamDepth),
-        counts_loss_(topic.delivery == Delivery::stream),
+  Inbox(const Topic& topic, int depth, Notifier& notifier)
+      : depth_(depth > 0 ? depth : depth_of(topic.delivery)),
+        counts_loss_(topic.delivery == Delivery::stream || depth > 1),
         notifier_(notifier) {}
 
   void push(std::uint32_t key, std::span<const std::byte> payload) {
@@ -146,8 +146,8 @@ class InprocWriter final : public Writer {
 
 class InprocReader final : public Reader {
  public:
-  InprocReader(const Topic& topic, Channel& channel, Notifier& notifier)
-      : inbox_(topic, notifier), channel_(channel) {
+  InprocReader(const Topic& topic, int depth, Channel& channel, Notifier& notifier)
+      : inbox_(topic, depth, notifier), channel_(channel) {
     std::lock_guard lock(channel_.mutex);
     for (const Outlet* outlet : channel_.outlets)
       for (const auto& [key, payload] : *outlet) inbox_.push(key, payload);
@@ -183,8 +183,8 @@ class InprocNode final : public Node {
   std::unique_ptr<Writer> writer(const Topic& topic) override {
     return std::make_unique<InprocWriter>(topic, space_->channel(topic));
   }
-  std::unique_ptr<Reader> reader(const Topic& topic) override {
-    return std::make_unique<InprocReader>(topic, space_->channel(topic), notifier_);
+  std::unique_ptr<Reader> reader(const Topic& topic, int depth) override {
+    return std::make_unique<InprocReader>(topic, depth, space_->channel(topic), notifier_);
   }
   bool wait(std::chrono::steady_clock::time_point deadline) override { return notifier_.wait(deadline); }
   void wake() noexcept override { notifier_.notify(); }

@@ -238,6 +238,8 @@ void read_perception(const text::Perception& m, SceneParts& out) {
   stream("start_s", s.start_s);
   stream("loop", s.loop);
   stream("glitch_mps", s.glitch_mps);
+  stream("until_s", s.until_s);
+  stream("topic", s.topic);
   out.stream_start_given = m.stream().has_start_s();
 }
 

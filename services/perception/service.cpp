@@ -83,14 +83,35 @@ bool PerceptionService::publish_until(double t_s) {
   if (!lockstep && number_at(t_s) > *next_ + 4) next_ = number_at(t_s);
   bool any = false;
   while (*next_ != kNever && static_cast<double>(*next_) * source_.period_s() <= t_s) {
-    if (to_wire(source_, *next_, lockstep, set_)) {
-      sets_out_.publish(set_);
-      ++published_;
-      any = true;
-    }
-    next_ = lockstep ? after(*next_) : *next_ + 1;
+    const bool promise = lockstep && !controlled_;
+    any |= publish_set(*next_, promise);
+    next_ = promise ? after(*next_) : *next_ + 1;
   }
   return any;
+}
+
+bool PerceptionService::publish_set(std::uint64_t k, bool promise) {
+  const bool stands = paused_ && steps_ == 0;
+  if (paused_ && steps_ > 0) --steps_;
+  if (stands) behind_ = k - std::min(shown_, k);
+  shown_ = k - std::min(behind_, k);
+  if (!to_wire(source_, k, shown_, promise, set_)) return false;
+  if (stands)
+    for (geometry::Obstacle& o : set_.obstacles) o.V_WO.setZero(), o.velocity_known = true;
+  ++published_;
+  return sets_out_.publish(set_);
+}
+
+void PerceptionService::pause(bool on) {
+  if (controlled_ && paused_ == on) return;
+  if (on && !next_) shown_ = 0;
+  controlled_ = true;
+  paused_ = on;
+  steps_ = 0;
+}
+
+void PerceptionService::step() {
+  if (paused_) ++steps_;
 }
 
 /// The number of the set that follows number k where something changes; kNever when nothing will.

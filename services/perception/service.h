@@ -17,6 +17,8 @@ namespace hamel::perception {
 /// that the planner need not wait for them, and none where nothing changes; in real time each period, when
 /// its time has come.  Inside a gap of a stream nothing is published: the planner's last set grows old and it
 /// says so.
+///
+/// While it is paused the sets go on and the world in them stands: places as they were, velocities zero.
 class PerceptionService final : public runtime::Service {
  public:
   /// Fails with what scene::problems() says of the scene's perception.
@@ -27,6 +29,14 @@ class PerceptionService final : public runtime::Service {
   int readers() const override { return sets_out_.matched(); }
   void close() override;
 
+  /// The world stands, or goes on from where it stood.  Once called, sets promise no more than their period.
+  void pause(bool on);
+  /// Paused: the world moves on by one set.
+  void step();
+  bool paused() const { return paused_; }
+  /// The time in the source that the last set showed.
+  double shown_s() const { return static_cast<double>(shown_) * source_.period_s(); }
+
  private:
   using Time = runtime::Clock::time_point;
   PerceptionService(bus::Node& node, const scene::Scene& scene, Source source);
@@ -34,6 +44,7 @@ class PerceptionService final : public runtime::Service {
   bool hear_clock(Time now);
   double run_time_s(Time now) const;
   bool publish_until(double t_s);
+  bool publish_set(std::uint64_t k, bool promise);
   std::uint64_t after(std::uint64_t k) const;
   void publish_status(Time now, wire::ServiceState state);
 
@@ -49,6 +60,10 @@ class PerceptionService final : public runtime::Service {
   Time clock_heard_{}, last_status_{};
   std::optional<std::uint64_t> next_;  ///< number of the next set; none: not begun
   std::uint64_t published_ = 0, repeated_ = 0;
+  bool controlled_ = false, paused_ = false;
+  std::uint64_t steps_ = 0;   ///< asked for and not made yet
+  std::uint64_t shown_ = 0;   ///< what the last set showed, as its number without pauses
+  std::uint64_t behind_ = 0;  ///< sets by which pauses have held the world back
 };
 
 }  // namespace hamel::perception

@@ -1,0 +1,87 @@
+"""What tests of recordings need: a folder, what a file holds, and its messages byte for byte."""
+
+import json
+import pathlib
+import signal
+import subprocess
+import tempfile
+import unittest
+
+from programs import BIN, hamel, scene
+
+SHORT = ["--duration", "0.5"]
+VENDORS = ("cyclonedds", "fastdds")
+DOMAIN = 50  # of these tests, and the nine behind it
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def file(self, name="run.mcap"):
+        return str(self.folder / name)
+
+    def info(self, file):
+        code, out, err = hamel("log", "info", file, "--json")
+        self.assertTrue(out, err)
+        return code, json.loads(out)
+
+    def cat(self, file, topic, *args):
+        """The messages of a topic, as dictionaries."""
+        code, out, err = hamel("log", "cat", file, "--topic", topic, "--json", *args)
+        self.assertIn(code, (0, 3), err)
+        return [json.loads(line) for line in out.splitlines()]
+
+    def recorded(self, name, *args):
+        """The file of a short lockstep run."""
+        file = self.file()
+        code, out, err = hamel("run", scene(name), "--record", file, "--json", *args)
+        self.assertIn(code, (0, 3), err)
+        return file, json.loads(out)
+
+    def payloads(self, file, topic="obstacles"):
+        """The bytes of each message of a topic, through a copy without compression."""
+        copy = self.file("copy.mcap")
+        hamel("log", "recover", file, "-o", copy, "--compression", "none")
+        data, found, at = pathlib.Path(copy).read_bytes(), [], 0
+        name = f"hamel/v1/{topic}".encode()
+        name_at = data.find(len(name).to_bytes(4, "little") + name)
+        channel = data[name_at - 4: name_at - 2]
+        while (at := data.find(b"\x05", at)) >= 0:  # message records: opcode, length, channel, sequence, two times
+            length = int.from_bytes(data[at + 1: at + 9], "little")
+            same_times = data[at + 15: at + 23] == data[at + 23: at + 31]
+            if 22 < length < 1 << 20 and data[at + 9: at + 11] == channel and same_times:
+                found.append(data[at + 31: at + 9 + length])
+            at += 1
+        self.assertEqual(len(found), len(self.cat(copy, topic)))
+        return found
+
+    def recorder(self, file, *args):
+        """A running `hamel record` that listens."""
+        r = Recorder(file, *args)
+        self.addCleanup(r.kill)
+        return r
+
+
+class Recorder:
+    def __init__(self, file, *args):
+        self.process = subprocess.Popen([BIN / "hamel", "record", "-o", file, *map(str, args)], stderr=subprocess.PIPE, text=True)
+        self.process.stderr.readline()  # it waits for writers
+
+    def await_writers(self):
+        for line in self.process.stderr:
+            if line.startswith("recording"):
+                return
+
+    def end(self):
+        """Ctrl-C: (exit code, what it said)."""
+        self.process.send_signal(signal.SIGINT)
+        _, err = self.process.communicate(timeout=20)
+        return self.process.returncode, err
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stderr.close()
