@@ -163,15 +163,15 @@ class Picture {
           c_.rows[0].energy_J);
     } else if (kind == "iterations") {
       s_.add(
-          "set ylabel 'iterations of a step, at most'\nset yrange [0:*]\n"
+          "set ylabel 'iterations of a step, at most'\nset yrange [0:*]\nset offsets 0,0,0.5,0\n"
           "plot $rows using 1:8 with steps lc rgb '#114488' notitle");
     } else {
-      s_.add("set ylabel '[ms]'\nset logscale y\nplot NaN notitle");
+      s_.add("set ylabel '[ms]'\nset logscale y\nset yrange [1e-3:*]\nplot NaN notitle");
       line(any(&Row::planner_s), 9, "#114488", "planner, wall time of a cycle", kDots);
       line(any(&Row::command_age_s), 10, "#cc6644", "command, age when applied", kDots);
       line(any(&Row::obstacle_age_s), 11, "#228833", "obstacles, age when used", kDots);
     }
-    s_.add("\nunset logscale y\n");
+    s_.add("\nunset logscale y\nset offsets 0,0,0,0\n");
   }
   void line(bool there, int column, const char* color, const char* title, const char* style = "lines") {
     if (there) s_.add(", $rows using 1:{} with {} lc rgb '{}' title '{}'", column, style, color, title);
