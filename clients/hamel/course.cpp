@@ -151,13 +151,16 @@ class RecordedRows {
         fmt::print(stderr, "hamel plot: {}: at byte {}: {}\n", o_.path, d->offset, d->what);
       if (const auto* c = std::get_if<record::Channel>(&*item)) topics_[c->id] = c->topic;
       if (const auto* a = std::get_if<record::Attachment>(&*item)) files_.add(*a);
+      if (const auto* m = std::get_if<record::Metadata>(&*item))
+        for (const auto& [key, value] : m->entries)
+          if (m->name == "hamel" && key == "scene") name_ = value;
       if (const auto* m = std::get_if<record::Message>(&*item)) take(topics_[m->channel], m->data);
     }
     auto scene = load_scene(files_, o_.path, o_.scene_path, o_.overrides);
     if (!scene) return scene.error();
     Course c;
     c.scene = std::move(scene).value();
-    c.name = c.scene->name;
+    c.name = name_.empty() ? c.scene->name : name_;
     const auto rows = rows_.find(c.scene->arm);
     if (rows == rows_.end())
       return Problems{{o_.path, fmt::format("holds no state of arm {}", c.scene->arm)}};
@@ -210,6 +213,7 @@ class RecordedRows {
 
   const CourseOptions& o_;
   Unpacked files_;
+  std::string name_;
   std::map<std::uint16_t, std::string> topics_;
   std::map<std::uint32_t, std::map<double, Row>> rows_;  // by arm and time
   std::vector<wire::ObstacleSet> sets_;

@@ -16,6 +16,10 @@ using namespace hamel;
 
 namespace {
 
+void add_overrides(CLI::App& app, std::vector<std::string>& overrides, const char* help) {
+  app.add_option("--set", overrides, help)->type_name("PATH=VALUE")->allow_extra_args(false);
+}
+
 void add_run_like(CLI::App& app, client::RunArgs& a) {
   runtime::add_run_options(app, a.run);
   app.add_flag("--json", a.json, "one JSON object on stdout instead of the table");
@@ -40,9 +44,7 @@ class RecordVerbs {
         ->check(CLI::PositiveNumber);
     record_->add_option("--scene", record_args_.scene_path,
                         "scene of the run, kept in the recording for replays");
-    record_->add_option("--set", record_args_.overrides, "overrides of the run")
-        ->type_name("PATH=VALUE")
-        ->allow_extra_args(false);
+    add_overrides(*record_, record_args_.overrides, "overrides of the run");
     runtime::add_bus_options(*record_, record_args_.bus);
 
     log_ = app.add_subcommand("log", "look into a recording");
@@ -100,9 +102,7 @@ class RecordVerbs {
         ->type_name("FIELD=NUMBER")
         ->allow_extra_args(false);
     replay_->add_option("--scene", replay_args_.scene_path, "scene to use instead of the recorded one");
-    replay_->add_option("--set", replay_args_.overrides, "override a field of the scene")
-        ->type_name("PATH=VALUE")
-        ->allow_extra_args(false);
+    add_overrides(*replay_, replay_args_.overrides, "override a field of the scene");
     replay_->add_flag("--json", replay_args_.json, "one JSON object");
   }
 
@@ -146,9 +146,7 @@ CLI::App* add_plot(CLI::App& app, client::PlotArgs& a) {
   plot->add_option("--scene", a.scene_path,
                    "scene of a CSV: draws arm, obstacles and target too; of a recording: instead of its own")
       ->type_name("SCENE");
-  plot->add_option("--set", a.overrides, "overrides the run was made with")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  add_overrides(*plot, a.overrides, "overrides the run was made with");
   return plot;
 }
 
@@ -156,9 +154,7 @@ CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
   auto* trade =
       app.add_subcommand("trade", "measure accuracy against cost of every tier on a scene's free motion");
   trade->add_option("scene", a.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
-  trade->add_option("--set", a.overrides, "override a field of the scene; repeat")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  add_overrides(*trade, a.overrides, "override a field of the scene; repeat");
   trade->add_option("--horizon", a.horizon_s, "seconds of motion instead of the scene's")
       ->check(CLI::PositiveNumber)
       ->type_name("SECONDS");
@@ -185,9 +181,7 @@ CLI::App* add_figures(CLI::App& app, client::FiguresArgs& a) {
   figures->add_option("scene", a.scene_path, "scene file; the paper's is three_link_swing.textproto")
       ->required()
       ->type_name("SCENE");
-  figures->add_option("--set", a.overrides, "override a field of the scene; repeat")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  add_overrides(*figures, a.overrides, "override a field of the scene; repeat");
   figures->add_option("-o,--output", a.folder, "folder for csv, svg and png")->required()->type_name("DIR");
   return figures;
 }

@@ -28,11 +28,12 @@ class Lateness {
     worst_s_ = std::max(worst_s_, late_s);
     if (late_s_.size() < kKept) late_s_.push_back(static_cast<float>(late_s));
   }
-  std::uint64_t count() const { return count_; }
+  /// ", late by ..."; empty: nothing had a time.
   std::string report() {
+    if (count_ == 0) return "";
     const auto p99 = late_s_.begin() + static_cast<std::ptrdiff_t>(late_s_.size() * 99 / 100);
     std::nth_element(late_s_.begin(), p99, late_s_.end());
-    return fmt::format("{} messages, late by {:.0f} us on average, p99 {:.0f} us, {:.0f} us at most", count_,
+    return fmt::format(", late by {:.0f} us on average, p99 {:.0f} us, {:.0f} us at most",
                        sum_s_ / static_cast<double>(count_) * 1e6, static_cast<double>(*p99) * 1e6,
                        worst_s_ * 1e6);
   }
@@ -84,9 +85,7 @@ class Player {
 
   std::uint64_t sent() const { return sent_; }
   bool quit() const { return quit_; }
-  std::string report() {
-    return lateness_.count() > 0 ? lateness_.report() : fmt::format("{} messages", sent_);
-  }
+  std::string report() { return fmt::format("{} messages{}", sent_, lateness_.report()); }
 
  private:
   bool ended() const { return quit_ || stop_.requested(); }

@@ -16,6 +16,7 @@ namespace hamel::client {
 namespace {
 
 constexpr int kSnapshots = 12;  // arms drawn along the run
+constexpr const char* kDots = "points pt 7 ps 0.2";
 
 /// A plane of the world that is drawn: its two axes.
 struct View {
@@ -48,8 +49,7 @@ class Picture {
     s_.add("{}", terminal(out_path, 480 * static_cast<int>(columns), 60 + 480 * static_cast<int>(rows)));
     add_rows();
     if (path) add_bodies();
-    s_.add("set multiplot layout {},{} title {}\nset key outside bottom center horizontal\n", rows, columns,
-           quoted(c_.name));
+    s_.add("set multiplot layout {},{} title {}\n", rows, columns, quoted(c_.name));
     for (const std::string& kind : kinds_) {
       if (kind == "path")
         for (std::size_t i = 0; i < views_.size(); ++i) path_panel(i);
@@ -126,8 +126,10 @@ class Picture {
 
   void path_panel(std::size_t i) {
     const View& v = views_[i];
-    s_.add("set size ratio -1\nset yrange [*:*]\nset xlabel '{} [m]'\nset ylabel '{} [m]'\nplot ",
-           v.label_across, v.label_up);
+    s_.add(
+        "set size ratio -1\nset yrange [*:*]\nset key outside bottom center horizontal\nset xlabel '{} "
+        "[m]'\nset ylabel '{} [m]'\nplot ",
+        v.label_across, v.label_up);
     if (has_outlines_ && c_.scene) s_.add("$reach{} with lines dt 3 lc rgb '#999999' title 'influence', ", i);
     if (has_outlines_) s_.add("$solid{} with filledcurves fc rgb '#cc6644' title 'obstacle', ", i);
     if (c_.scene) {
@@ -149,7 +151,7 @@ class Picture {
                        [&](const Row& r) { return std::isfinite(r.*member); });
   }
   void panel(const std::string& kind) {
-    s_.add("set size noratio\nset xlabel 't [s]'\nset yrange [*:*]\n");
+    s_.add("set size noratio\nset xlabel 't [s]'\nset yrange [*:*]\nset key outside top center vertical\n");
     if (kind == "clearance") {
       s_.add("set ylabel '[m]'\nplot 0 lc rgb '#888888' notitle");
       line(any(&Row::error_m), 6, "#228833", "distance to target");
@@ -161,18 +163,18 @@ class Picture {
           c_.rows[0].energy_J);
     } else if (kind == "iterations") {
       s_.add(
-          "set ylabel 'iterations of a step, at most'\nset yrange [0:*]\n"
+          "set ylabel 'iterations of a step, at most'\nset yrange [0:*]\nset offsets 0,0,0.5,0\n"
           "plot $rows using 1:8 with steps lc rgb '#114488' notitle");
     } else {
-      s_.add("set ylabel 'at most [ms]'\nset yrange [0:*]\nplot 0 lc rgb '#888888' notitle");
-      line(any(&Row::planner_s), 9, "#114488", "planner, wall time of a cycle");
-      line(any(&Row::command_age_s), 10, "#cc6644", "command, age when applied");
-      line(any(&Row::obstacle_age_s), 11, "#228833", "obstacles, age when used");
+      s_.add("set ylabel '[ms]'\nset logscale y\nset yrange [1e-3:*]\nplot NaN notitle");
+      line(any(&Row::planner_s), 9, "#114488", "planner, wall time of a cycle", kDots);
+      line(any(&Row::command_age_s), 10, "#cc6644", "command, age when applied", kDots);
+      line(any(&Row::obstacle_age_s), 11, "#228833", "obstacles, age when used", kDots);
     }
-    s_.add("\n");
+    s_.add("\nunset logscale y\nset offsets 0,0,0,0\n");
   }
-  void line(bool there, int column, const char* color, const char* title) {
-    if (there) s_.add(", $rows using 1:{} with lines lc rgb '{}' title '{}'", column, color, title);
+  void line(bool there, int column, const char* color, const char* title, const char* style = "lines") {
+    if (there) s_.add(", $rows using 1:{} with {} lc rgb '{}' title '{}'", column, style, color, title);
   }
 
   const Course& c_;

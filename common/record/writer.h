@@ -15,7 +15,7 @@ namespace hamel::record {
 
 struct WriterOptions {
   Compression compression = Compression::lz4;
-  std::size_t chunk_bytes = 1 << 20;           ///< uncompressed; a larger message makes a larger chunk
+  std::size_t chunk_bytes = 256 * 1024;        ///< uncompressed; a larger message makes a larger chunk
   std::chrono::milliseconds flush_every{500};  ///< a chunk is written when it is so old
   std::string library = "hamel";
 };

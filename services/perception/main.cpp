@@ -55,7 +55,8 @@ class Controlled final : public runtime::Service {
  private:
   void obey(runtime::PlayerCommand command) {
     using C = runtime::PlayerCommand;
-    if (command == C::quit) quit_ = true;
+    quit_ |= command == C::quit;
+    if (quit_) return;
     if (command == C::step) service_.pause(true), service_.step();
     if (command == C::pause || command == C::resume || command == C::toggle)
       service_.pause(command == C::toggle ? !service_.paused() : command == C::pause);

@@ -12,6 +12,8 @@ using namespace std::chrono_literals;
 
 namespace {
 constexpr std::uint64_t kNever = ~std::uint64_t{0};
+
+std::int64_t number(std::uint64_t k) { return static_cast<std::int64_t>(k); }
 }  // namespace
 
 Checked<std::unique_ptr<PerceptionService>> PerceptionService::make(bus::Node& node,
@@ -58,6 +60,7 @@ bool PerceptionService::hear_clock(Time now) {
     const bool anew = !clock_ || c.incarnation != clock_->incarnation || c.step < clock_->step;
     if (again) ++repeated_;
     if (again || anew) next_.reset();
+    if (anew && !paused_) behind_ = 0;
     clock_ = c;
     set_.incarnation = c.incarnation;  // sets of an earlier run of the arm are none of this one
     clock_heard_ = now;
@@ -92,10 +95,10 @@ bool PerceptionService::publish_until(double t_s) {
 
 bool PerceptionService::publish_set(std::uint64_t k, bool promise) {
   const bool stands = paused_ && steps_ == 0;
-  if (paused_ && steps_ > 0) --steps_;
-  if (stands) behind_ = k - std::min(shown_, k);
-  shown_ = k - std::min(behind_, k);
-  if (!to_wire(source_, k, shown_, promise, set_)) return false;
+  if (paused_ && steps_ > 0) --steps_, ++shown_;
+  if (!paused_) shown_ = std::max(number(k) - behind_, number(0));
+  behind_ = number(k) - shown_;
+  if (!to_wire(source_, k, static_cast<std::uint64_t>(shown_), promise, set_)) return false;
   if (stands)
     for (geometry::Obstacle& o : set_.obstacles) o.V_WO.setZero(), o.velocity_known = true;
   ++published_;
@@ -104,7 +107,6 @@ bool PerceptionService::publish_set(std::uint64_t k, bool promise) {
 
 void PerceptionService::pause(bool on) {
   if (controlled_ && paused_ == on) return;
-  if (on && !next_) shown_ = 0;
   controlled_ = true;
   paused_ = on;
   steps_ = 0;

@@ -61,9 +61,9 @@ class PerceptionService final : public runtime::Service {
   std::optional<std::uint64_t> next_;  ///< number of the next set; none: not begun
   std::uint64_t published_ = 0, repeated_ = 0;
   bool controlled_ = false, paused_ = false;
-  std::uint64_t steps_ = 0;   ///< asked for and not made yet
-  std::uint64_t shown_ = 0;   ///< what the last set showed, as its number without pauses
-  std::uint64_t behind_ = 0;  ///< sets by which pauses have held the world back
+  std::uint64_t steps_ = 0;  ///< asked for and not made yet
+  std::int64_t shown_ = 0;   ///< what the last set showed, as its number without pauses
+  std::int64_t behind_ = 0;  ///< sets by which pauses hold the world back; of a run begun anew, < 0: ahead
 };
 
 }  // namespace hamel::perception

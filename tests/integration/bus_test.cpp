@@ -155,6 +155,26 @@ TEST_P(Bus, SlowReaderFindsTheLastLatchedSample) {
   }));
 }
 
+TEST_P(Bus, AReaderMayAskForMoreOfALatchedTopicThanTheLast) {
+  const auto a = from(13), b = to(13);
+  const auto writer = a->writer(topics::kObstacles);
+  const auto reader = b->reader(topics::kObstacles, 64);
+  const auto witness =
+      b->reader(topics::kObstacles);  // of the usual depth: when it has the last, all are there
+  ASSERT_TRUE(wait_for(*b, [&] { return writer->matched() == 2 && reader->matched() == 1; }));
+  for (std::uint32_t i = 0; i < 50; ++i) ASSERT_TRUE(writer->write(sample(7, i)));
+  Payload p = sample(7, 0);
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (number_in(p) != 49 && witness->take(p)) {
+    }
+    return number_in(p) == 49;
+  }));
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    ASSERT_TRUE(wait_for(*b, [&] { return reader->take(p); }));
+    ASSERT_EQ(number_in(p), i);
+  }
+}
+
 TEST_P(Bus, StoppedReaderDoesNotBlockTheWriter) {
   const auto a = from(4), b = to(4);
   const auto writer = a->writer(topics::kState);

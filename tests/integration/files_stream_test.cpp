@@ -72,7 +72,7 @@ TEST(StreamFile, SetsOfARecordingAreSamplesAtTheirTimes) {
   ASSERT_EQ(s.samples.size(), 5u);
   EXPECT_EQ(s.first_s, 2);
   EXPECT_EQ(s.empty_s, std::vector<double>{2.5});
-  EXPECT_EQ(s.samples[3].t_s, 2.3000000000000003);
+  EXPECT_EQ(s.samples[3].t_s, 2 + 0.1 * 3);
   EXPECT_EQ(s.samples[3].id, 7u);
   EXPECT_EQ(s.samples[3].p_m, Eigen::Vector3d(0.3 * 3, 2, 3));
   EXPECT_EQ(s.samples[3].shape.kind, geometry::ShapeKind::capsule);

@@ -169,7 +169,7 @@ TEST_P(EveryCompression, CutAnywhereItGivesEveryCompleteChunk) {
     ASSERT_FALSE(found.damages.empty()) << n;
     ASSERT_EQ(found.messages.size(), least) << n;
     for (std::uint32_t i = 0; i < found.messages.size(); ++i) ASSERT_EQ(found.messages[i], sample(i)) << n;
-    if (k % 20 != 0) continue;
+    std::filesystem::remove(mended);
     const auto r = recover(cut, mended, GetParam());
     if (!r) {
       EXPECT_LT(n, kMagic.size());
@@ -264,7 +264,7 @@ TEST(Record, MemoryDoesNotGrowWithTheFile) {
   auto in = IndexedReader::open(file);
   ASSERT_TRUE(in);
   EXPECT_EQ(in.value().summary().chunks.size(), 100'000u);
-  in.value().seek({.begin = 77'777, .end = 77'777});
+  in.value().seek({.topics = {}, .begin = 77'777, .end = 77'777});
   const auto item = in.value().next();
   ASSERT_TRUE(item && std::holds_alternative<Message>(*item));
   EXPECT_EQ(std::get<Message>(*item).sequence, 77'777u);

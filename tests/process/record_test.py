@@ -2,10 +2,12 @@
 """Recordings as a user makes them: kept, looked into, replayed to the last bit, mended."""
 
 import json
+import os
 import pathlib
 import signal
 import subprocess
 import time
+import unittest
 
 from programs import BIN, Up, hamel, main, outcome, scene
 from recordings import DOMAIN, SHORT, Files
@@ -219,6 +221,12 @@ class Record(Files):
         self.assertEqual((code, info["complete"]), (0, True))
         self.assertGreater(info["topics"]["hamel/v1/state"], 300)
         self.assertGreaterEqual(info["topics"]["hamel/v1/robot"], 1)
+
+    @unittest.skipUnless(os.environ.get("HAMEL_SOAK") == "1", "a measurement: with tests/run --soak")
+    def test_it_costs_less_than_a_tenth_of_a_core_and_drops_nothing(self):
+        done = subprocess.run([os.environ["HAMEL_RECORD_BENCH"], BIN / "hamel", "20"], capture_output=True, text=True, timeout=120)
+        print("\n" + done.stdout, flush=True)
+        self.assertEqual(done.returncode, 0)
 
     def test_nobody_there_is_exit_code_three(self):
         self.assertEqual(hamel("record", "-o", self.file(), "--domain", DOMAIN + 8, "--duration", 0.5)[0], 3)

@@ -5,6 +5,7 @@ import csv
 import json
 import os
 import pathlib
+import pty
 import signal
 import subprocess
 import unittest
@@ -68,6 +69,27 @@ class Play(Files):
         recorder.end()
         self.assertEqual(self.payloads(again), self.payloads(file))
 
+    def test_keys_of_a_terminal(self):
+        file, _ = self.recorded("panda_person", *SHORT)
+        pid, terminal = pty.fork()
+        if pid == 0:
+            os.execv(BIN / "hamel", ["hamel", "play", file, "--domain", str(DOMAIN), "--control", "--paused"])
+        said = b""
+
+        def until(word):
+            nonlocal said
+            while word not in said:
+                said += os.read(terminal, 1000)
+
+        until(b"space: pause")
+        os.write(terminal, b"..")
+        until(b"step to 0.033333 s")
+        os.write(terminal, b" ")
+        until(b"goes on")
+        until(b"16 messages")
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), 0)
+        os.close(terminal)
+
     def test_quit_ends_it(self):
         file, _ = self.recorded("panda_person", *SHORT)
         done = subprocess.run([BIN / "hamel", "play", file, "--domain", str(DOMAIN), "--control", "--paused", "--loop"],
@@ -80,7 +102,8 @@ class Streams(Files):
     """Every set of every stream, with its obstacles, in order, at its time."""
 
     def check(self, name, rate):
-        rows = list(csv.DictReader((pathlib.Path(DATA) / "streams" / name).open()))
+        with (pathlib.Path(DATA) / "streams" / name).open() as file:
+            rows = list(csv.DictReader(file))
         expected = {}
         for r in rows:
             expected.setdefault(float(r["t_s"]), []).append((int(r["id"]), float(r["x_m"]), float(r["radius_m"])))
@@ -176,18 +199,31 @@ class Perception(Files):
         sight = subprocess.Popen([BIN / "hamel-perception", *args, "--control", "--paused", "--rate", "2"],
                                  stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(sight.kill)
-        arm = subprocess.Popen([BIN / "hamel-dynamics", *args, "--set", "steered=false", "--duration", "2"], stderr=subprocess.DEVNULL)
-        arm.wait(30)
-        _, err = sight.communicate("step\nresume\nquit\n", timeout=30)
-        self.assertEqual(sight.returncode, 0, err)
-        self.assertRegex(err, "stands at 0.000 s")
+        arm = [BIN / "hamel-dynamics", *args, "--readers", "1", "--duration"]
+        subprocess.run([*arm, "1"], stderr=subprocess.DEVNULL, timeout=30)
         recorder.end()
-        sets = [m["message"] for m in self.cat(file, "obstacles")]
-        self.assertGreater(len(sets), 20)
-        for s in sets:
-            for o, first in zip(s["obstacles"], sets[0]["obstacles"]):
+        stood = [m["message"] for m in self.cat(file, "obstacles")]
+        self.assertGreater(len(stood), 10)
+        for s in stood:
+            for o, first in zip(s["obstacles"], stood[0]["obstacles"]):
                 self.assertEqual(o["position_m"], first["position_m"])
                 self.assertEqual(o["twist"], [0] * 6)
+        # Three steps: the world is where an unpaused one is after three periods.
+        recorder = self.recorder(file, *bus)
+        sight.stdin.write("step\nstep\nstep\n")
+        sight.stdin.flush()
+        for _ in range(3):
+            sight.stderr.readline()
+        subprocess.run([*arm, "1"], stderr=subprocess.DEVNULL, timeout=30)
+        _, err = sight.communicate("resume\nquit\n", timeout=30)
+        self.assertEqual(sight.returncode, 0, err)
+        self.assertIn("goes on at 0.100 s", err)
+        recorder.end()
+        stepped = self.cat(file, "obstacles")[-1]["message"]
+        by_steps = [o["position_m"] for o in stepped["obstacles"]]
+        free, _ = self.recorded("panda_person", *SHORT, "--set", "perception.stream.rate=2")
+        third = self.cat(free, "obstacles")[3]["message"]
+        self.assertEqual(by_steps, [o["position_m"] for o in third["obstacles"]])
 
 
 if __name__ == "__main__":
