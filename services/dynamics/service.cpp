@@ -12,8 +12,10 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::uint32_t kCheckpointKind = 0x0101;  // dynamics, layout 1
+constexpr std::uint32_t kCheckpointKind = 0x0102;  // dynamics, layout 2
 constexpr auto kRepeat = 100ms;                    // lockstep: say it again to peers that came late
+constexpr auto kYoung = 3s;                        // so long a new arm gives way to one that is there
+constexpr auto kPause = 1s;                        // who was away for longer is new again
 constexpr int kBurst = 64;  // steps before the other services of the process get their turn
 
 runtime::Clock::duration seconds(double s) {
@@ -39,6 +41,8 @@ const char* to_string(Outcome v) {
       return "no_command";
     case Outcome::diverged:
       return "diverged";
+    case Outcome::not_alone:
+      return "not_alone";
   }
   return "?";
 }
@@ -48,19 +52,25 @@ Result<std::unique_ptr<DynamicsService>, Problem> DynamicsService::make(bus::Nod
                                                                         const ServiceConfig& config) {
   std::unique_ptr<DynamicsService> s(new DynamicsService(node, scene, config));
   if (config.state_dir.empty()) return s;
-  const std::string path = config.state_dir + "/dynamics-" + std::to_string(scene.arm) + ".checkpoint";
-  auto c = runtime::Checkpoint::open(path, kCheckpointKind,
-                                     4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512);
+  auto c = runtime::Checkpoint::resume(config.state_dir, "dynamics", scene.arm, kCheckpointKind,
+                                       4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512,
+                                       [&](std::span<const std::byte> bytes) { return s->load(bytes); });
   if (!c) return c.error();
   s->checkpoint_ = std::move(c).value();
-  std::string note;
-  const auto bytes = s->checkpoint_->load(note);
-  if (!note.empty()) spdlog::warn("{}: {}", path, note);
-  if (!bytes.empty() && s->load(bytes))
-    spdlog::info("resumed at step {} (t = {:.3f} s)", s->arm_.state().step, s->arm_.t_s());
-  else if (!bytes.empty())
-    spdlog::warn("{}: of another scene or version, refused; starting afresh", path);
   return s;
+}
+
+int DynamicsService::exit_code() const {
+  switch (outcome_) {
+    case Outcome::no_command:
+      return runtime::kNoData;
+    case Outcome::diverged:
+      return runtime::kFailed;
+    case Outcome::not_alone:
+      return runtime::kBadInput;
+    default:
+      return runtime::kDone;
+  }
 }
 
 DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, const ServiceConfig& config)
@@ -72,11 +82,11 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
       state_out_(node),
       clock_out_(node),
       summary_out_(node),
-      status_out_(node),
       robot_out_(node),
       command_in_(node),
       mode_in_(node),
-      bus_name_(bus::to_string(node.options().vendor)) {
+      clock_in_(node),
+      presence_(node, wire::ServiceKind::dynamics, scene.arm) {
   const double dt = scene.dynamics.dt_s;
   last_step_ = static_cast<std::uint64_t>(std::llround(scene.duration_s / dt));
   clock_every_ = static_cast<std::uint64_t>(std::max(1.0, std::floor(0.01 / dt + 1e-9)));
@@ -90,7 +100,8 @@ bool DynamicsService::poll(Time now) {
   if (finished()) return false;
   if (!started_) {
     started_ = true;
-    next_step_ = waiting_since_ = last_publish_ = now;
+    next_step_ = waiting_since_ = last_publish_ = last_poll_ = now;
+    young_until_ = now + kYoung;
     wire::RobotDescription d;
     d.arm = scene_.arm;
     d.name = scene_.robot.name;
@@ -102,6 +113,8 @@ bool DynamicsService::poll(Time now) {
     publish_clock(true);
     publish_state();
   }
+  meet_other_arms(now);
+  if (finished()) return true;
   take_modes();
   take_commands();
   const bool progressed = config_.pace == scene::Pace::lockstep ? poll_lockstep(now) : poll_realtime(now);
@@ -125,10 +138,33 @@ void DynamicsService::take_modes() {
   }
 }
 
+/// Two arms of one key on one domain: the one that has run longer stays, the new one ends.  Of two that are
+/// new the smaller incarnation stays, of equals the smaller writer id.
+void DynamicsService::meet_other_arms(Time now) {
+  if (now - last_poll_ > kPause) young_until_ = now + kYoung;  // stopped for a while: others may have come
+  last_poll_ = now;
+  wire::SimulationClock c;
+  while (clock_in_.take(c)) {
+    const bus::WriterId from = clock_in_.from(), own = clock_out_.id();
+    if (c.arm != scene_.arm || from == own || !c.running) continue;
+    if (now > young_until_) {
+      if (refusals_(now))
+        spdlog::warn("another arm {} speaks on this domain; this one was here before", c.arm);
+    } else if (incarnation_ > c.incarnation || (incarnation_ == c.incarnation && own > from)) {
+      end(Outcome::not_alone,
+          fmt::format(
+              "arm {} runs already on this domain (t = {:.3f} s): another --domain, or another arm in the "
+              "scene",
+              c.arm, c.t_s));
+      return;
+    }
+  }
+}
+
 void DynamicsService::take_commands() {
   while (command_in_.take(incoming_)) {
     if (incoming_.arm != scene_.arm) continue;
-    if (!accept(incoming_)) {
+    if (!fits(incoming_) || !owns(incoming_) || (command_step_ && incoming_.step <= *command_step_)) {
       ++commands_refused_;
       continue;
     }
@@ -136,15 +172,14 @@ void DynamicsService::take_commands() {
     command_step_ = incoming_.step;
     command_includes_gravity_ = incoming_.includes_gravity;
     planner_state_ = incoming_.planner_state;
-    epoch_ = incoming_.epoch;
     state_.caused_by.size = 0;
     state_.caused_by.add(wire::ServiceKind::planner, incoming_.step);
   }
 }
 
-/// A command must be of our size, answer a state of this incarnation that was published, be newer than the
-/// one that holds, and come from the planner with the largest epoch.
-bool DynamicsService::accept(const wire::TorqueCommand& c) {
+/// A command must be of our size and answer a state of this incarnation that was published, and in real time
+/// one that is not stale yet.
+bool DynamicsService::fits(const wire::TorqueCommand& c) {
   if (c.torque.size() != command_.size()) {
     if (refusals_(runtime::Clock::now()))
       spdlog::warn("command for {} joints refused: arm {} has {}", c.torque.size(), scene_.arm,
@@ -152,8 +187,28 @@ bool DynamicsService::accept(const wire::TorqueCommand& c) {
     return false;
   }
   if (c.state_incarnation != incarnation_ || c.step > arm_.state().step) return false;
-  if (command_step_ && c.step <= *command_step_) return false;
-  return c.epoch >= epoch_ || owner_is_silent();
+  const double age_s = static_cast<double>(arm_.state().step - c.step) * scene_.dynamics.dt_s;
+  return config_.pace == scene::Pace::lockstep || age_s <= command_stale_s();
+}
+
+/// One planner drives the arm: the one with the largest epoch, of equals the one that has it.  Any other may
+/// take over once that one is silent.
+bool DynamicsService::owns(const wire::TorqueCommand& c) {
+  const bus::WriterId from = command_in_.from();
+  const bool stronger = from == owner_ ? c.epoch >= epoch_ : c.epoch > epoch_;
+  if (!stronger && !owner_is_silent()) {
+    if (from != owner_ && refusals_(runtime::Clock::now()))
+      spdlog::warn("another planner commands arm {} (epoch {}): refused, the one with epoch {} has it",
+                   scene_.arm, c.epoch, epoch_);
+    return false;
+  }
+  if (from != owner_) {
+    if (command_step_) spdlog::info("the planner with epoch {} takes arm {} over", c.epoch, scene_.arm);
+    driven_from_.reset();
+  }
+  owner_ = from;
+  epoch_ = c.epoch;
+  return true;
 }
 
 /// True when the planner that holds the arm has not been heard for longer than a command stays fresh: another
@@ -236,6 +291,7 @@ void DynamicsService::count_lateness(Time now) {
 
 /// Mode commands outrank the planner; a planner that is silent or absent leaves the arm holding still.
 Drive DynamicsService::choose_drive() {
+  if (mode_ || !command_step_) driven_from_.reset();
   if (mode_) {
     const bool stop = *mode_ == wire::Mode::stop;
     validity_ = stop ? wire::Validity::stopped : wire::Validity::holding;
@@ -251,11 +307,24 @@ Drive DynamicsService::choose_drive() {
   }
   if (config_.pace == scene::Pace::realtime && command_age_s() > command_stale_s()) {
     ++commands_missed_;
+    outages_ += validity_ == wire::Validity::valid;
     validity_ = wire::Validity::command_stale;
-    return {.kind = DriveKind::hold};
+    driven_from_.reset();
+    return {.kind = scene_.dynamics.on_silence == scene::Safe::hold ? DriveKind::hold : DriveKind::brake};
   }
   validity_ = wire::Validity::valid;
-  return {.kind = DriveKind::torque, .torque_Nm = &command_, .includes_gravity = command_includes_gravity_};
+  if (!driven_from_) driven_from_ = arm_.state().step;
+  return {.kind = DriveKind::torque,
+          .torque_Nm = &command_,
+          .includes_gravity = command_includes_gravity_,
+          .share = share()};
+}
+
+/// Real time: a command that follows a hold comes in over planner.ramp_s, so that nothing jumps.
+double DynamicsService::share() const {
+  if (config_.pace == scene::Pace::lockstep || !(scene_.planner.ramp_s > 0)) return 1;
+  const double driven_s = static_cast<double>(arm_.state().step - *driven_from_) * scene_.dynamics.dt_s;
+  return std::min(1.0, driven_s / scene_.planner.ramp_s);
 }
 
 bool DynamicsService::step() {
@@ -308,26 +377,20 @@ void DynamicsService::publish_summary(bool final_summary) {
 }
 
 void DynamicsService::publish_status(wire::ServiceState state) {
-  wire::ServiceStatus s;
-  s.kind = wire::ServiceKind::dynamics;
-  s.arm = scene_.arm;
-  s.incarnation = incarnation_;
-  s.version = runtime::version();
-  s.idl_hash = wire::idl_hash();
-  s.bus = bus_name_;
-  s.state = state;
-  s.detail = finished() ? to_string(outcome_) : wire::to_string(validity_);
-  s.counters = {{"steps", arm_.state().step},
-                {"commands_refused", commands_refused_},
-                {"commands_missed", commands_missed_},
-                {"deadlines_missed", deadlines_missed_},
-                {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}};
-  status_out_.publish(s);
+  presence_.say(runtime::Clock::now(),
+                {.state = state,
+                 .incarnation = incarnation_,
+                 .detail = finished() ? to_string(outcome_) : wire::to_string(validity_),
+                 .counters = {{"steps", arm_.state().step},
+                              {"outages", outages_},
+                              {"commands_refused", commands_refused_},
+                              {"commands_missed", commands_missed_},
+                              {"deadlines_missed", deadlines_missed_},
+                              {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}}});
 }
 
 void DynamicsService::publish_periodic(Time now) {
-  if (now - last_status_ >= 500ms) {
-    last_status_ = now;
+  if (presence_.due(now)) {
     publish_status(wire::ServiceState::ready);
     publish_summary(finished());
   }
@@ -343,11 +406,13 @@ void DynamicsService::end(Outcome outcome, const std::string& why) {
     spdlog::debug("{}", why);
   else
     spdlog::error("{}", why);
+  if (outcome == Outcome::not_alone) return;  // the arm's word is another's
   publish_clock(false);
   publish_summary(true);
 }
 
 void DynamicsService::close() {
+  if (outcome_ == Outcome::not_alone) return;
   publish_clock(false);
   publish_summary(true);
   publish_status(wire::ServiceState::stopping);
@@ -368,6 +433,8 @@ void DynamicsService::save() {
   p.put(hash_.digest());
   p.put(mode_.has_value() ? static_cast<std::int32_t>(*mode_) : -1);
   p.put(mode_id_);
+  const Eigen::VectorXd* held = arm_.held();
+  p.put(held ? held->data() : nullptr, held ? static_cast<std::size_t>(held->size()) : 0);
   checkpoint_->save(packed_);
 }
 
@@ -378,16 +445,20 @@ bool DynamicsService::load(std::span<const std::byte> bytes) {
   Books books;
   TrajectoryHash::Digest digest;
   std::int32_t mode = -1;
+  Eigen::VectorXd held;
   const bool whole = u.get(print) && u.get(incarnation) && u.get(s.step) && u.get_doubles(s.q) &&
                      u.get_doubles(s.p) && u.get_doubles(s.qd) && u.get_doubles(s.history) && u.get(books) &&
-                     u.get(digest) && u.get(mode) && u.get(mode_id) && u.at_end();
+                     u.get(digest) && u.get(mode) && u.get(mode_id) && u.get_doubles(held) && u.at_end();
   const Eigen::Index n = arm_.state().q.size();
-  if (!whole || print != fingerprint_ || s.q.size() != n || s.p.size() != n || s.qd.size() != n) return false;
+  if (!whole || print != fingerprint_ || s.q.size() != n || s.p.size() != n || s.qd.size() != n ||
+      (held.size() != 0 && held.size() != n))
+    return false;
   incarnation_ = incarnation;
-  arm_.restore(s, books);
+  arm_.restore(s, books, held.size() == n ? &held : nullptr);
   hash_.restore(digest);
   if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
   mode_id_ = mode_id;
+  spdlog::info("resumed at step {} (t = {:.3f} s)", arm_.state().step, arm_.t_s());
   return true;
 }
 
