@@ -174,13 +174,14 @@ Listener listener_for(Events& events) {
 /// `promises`: those of a topic's writers, offered by each, asked for by some readers.
 Qos qos_for(const Topic& topic, bool writes, int depth, bool promises) {
   const bool latched = topic.delivery == Delivery::latched;
+  const auto more = writes ? std::chrono::milliseconds(0) : kRounding;
   Qos q(dds_create_qos());
   dds_qset_reliability(q.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_durability(q.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, depth);
   dds_qset_resource_limits(q.get(), kMaxInstances * depth, kMaxInstances, depth);
-  if (promises && topic.rate_hz > 0) dds_qset_deadline(q.get(), DDS_MSECS(topic.stale.count()));
-  if (promises) dds_qset_liveliness(q.get(), DDS_LIVELINESS_AUTOMATIC, DDS_MSECS(kAlive.count()));
+  if (promises && topic.rate_hz > 0) dds_qset_deadline(q.get(), DDS_MSECS((topic.stale + more).count()));
+  if (promises) dds_qset_liveliness(q.get(), DDS_LIVELINESS_AUTOMATIC, DDS_MSECS((kAlive + more).count()));
   if (writes) dds_qset_writer_data_lifecycle(q.get(), false);
   return q;
 }

@@ -155,10 +155,10 @@ Qos common_qos(const Topic& topic, int depth) {
 
 /// The promises of a topic's writers, offered by each, asked for by some readers.
 template <class Qos>
-void promise(Qos& qos, const Topic& topic) {
-  if (topic.rate_hz > 0) qos.deadline().period = duration(topic.stale);
+void promise(Qos& qos, const Topic& topic, std::chrono::milliseconds more = {}) {
+  if (topic.rate_hz > 0) qos.deadline().period = duration(topic.stale + more);
   qos.liveliness().kind = dds::AUTOMATIC_LIVELINESS_QOS;
-  qos.liveliness().lease_duration = duration(kAlive);
+  qos.liveliness().lease_duration = duration(kAlive + more);
   qos.liveliness().announcement_period = duration(kAlive / 3);
 }
 
@@ -308,7 +308,7 @@ class FastNode final : public Node {
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false));
     auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
-    if (ask == Ask::promises) promise(qos, topic);
+    if (ask == Ask::promises) promise(qos, topic, kRounding);
     auto& made = checked(subscriber_->create_datareader(&topic_for(topic), qos, &events), "reader", topic);
     return std::make_unique<FastReader>(topic, *subscriber_, made, events);
   }

@@ -47,6 +47,9 @@ const char* policy_name(int id);
 
 /// What writers promise to those that ask: to write at least once in `stale`, to say that they live.
 inline constexpr std::chrono::milliseconds kAlive{1000};
+/// What those that ask allow beyond it: on the wire a time is a binary fraction, rounded by each vendor its
+/// way.
+inline constexpr std::chrono::milliseconds kRounding{1};
 
 /// An end of ours and a peer cannot agree: kept by the vendor's thread, told by the owner's.
 struct Disagreement {

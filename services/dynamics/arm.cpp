@@ -97,8 +97,10 @@ double Arm::energy_drift_rel() const noexcept {
   return scale > 0 ? books_.drift_J / scale : 0;
 }
 
-void Arm::restore(const State& state, const Books& books, const Eigen::VectorXd* held) {
+void Arm::restore(const State& state, const Books& books, const Eigen::VectorXd& applied,
+                  const Eigen::VectorXd* held) {
   state_ = state;
+  tau_ = applied;
   books_ = books;
   holding_ = held != nullptr;
   if (held) q_hold_ = *held;

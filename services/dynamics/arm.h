@@ -58,8 +58,10 @@ class Arm {
 
   /// The place that is held; none while nothing is held.
   const Eigen::VectorXd* held() const noexcept { return holding_ ? &q_hold_ : nullptr; }
-  /// Continues from a saved state, its books and the place held (null: none); exact.
-  void restore(const State& state, const Books& books, const Eigen::VectorXd* held);
+  /// Continues from a saved state, its books, the torque that was applied and the place held (null: none);
+  /// exact.
+  void restore(const State& state, const Books& books, const Eigen::VectorXd& applied,
+               const Eigen::VectorXd* held);
 
  private:
   void drive_torque(const Drive& drive) noexcept;

@@ -12,11 +12,8 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::uint32_t kCheckpointKind = 0x0102;  // dynamics, layout 2
-constexpr auto kRepeat = 100ms;                    // lockstep: say it again to peers that came late
-constexpr auto kYoung = 3s;                        // so long a new arm gives way to one that is there
-constexpr auto kPause = 1s;                        // who was away for longer is new again
-constexpr int kBurst = 64;  // steps before the other services of the process get their turn
+constexpr auto kRepeat = 100ms;  // lockstep: say it again to peers that came late
+constexpr int kBurst = 64;       // steps before the other services of the process get their turn
 
 runtime::Clock::duration seconds(double s) {
   return std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(s));
@@ -52,9 +49,7 @@ Result<std::unique_ptr<DynamicsService>, Problem> DynamicsService::make(bus::Nod
                                                                         const ServiceConfig& config) {
   std::unique_ptr<DynamicsService> s(new DynamicsService(node, scene, config));
   if (config.state_dir.empty()) return s;
-  auto c = runtime::Checkpoint::resume(config.state_dir, "dynamics", scene.arm, kCheckpointKind,
-                                       4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512,
-                                       [&](std::span<const std::byte> bytes) { return s->load(bytes); });
+  auto c = s->open_checkpoint();
   if (!c) return c.error();
   s->checkpoint_ = std::move(c).value();
   return s;
@@ -101,7 +96,6 @@ bool DynamicsService::poll(Time now) {
   if (!started_) {
     started_ = true;
     next_step_ = waiting_since_ = last_publish_ = last_poll_ = now;
-    young_until_ = now + kYoung;
     wire::RobotDescription d;
     d.arm = scene_.arm;
     d.name = scene_.robot.name;
@@ -138,96 +132,6 @@ void DynamicsService::take_modes() {
   }
 }
 
-/// Two arms of one key on one domain: the one that has run longer stays, the new one ends.  Of two that are
-/// new the smaller incarnation stays, of equals the smaller writer id.
-void DynamicsService::meet_other_arms(Time now) {
-  if (now - last_poll_ > kPause) young_until_ = now + kYoung;  // stopped for a while: others may have come
-  last_poll_ = now;
-  wire::SimulationClock c;
-  while (clock_in_.take(c)) {
-    const bus::WriterId from = clock_in_.from(), own = clock_out_.id();
-    if (c.arm != scene_.arm || from == own || !c.running) continue;
-    if (now > young_until_) {
-      if (refusals_(now))
-        spdlog::warn("another arm {} speaks on this domain; this one was here before", c.arm);
-    } else if (incarnation_ > c.incarnation || (incarnation_ == c.incarnation && own > from)) {
-      end(Outcome::not_alone,
-          fmt::format(
-              "arm {} runs already on this domain (t = {:.3f} s): another --domain, or another arm in the "
-              "scene",
-              c.arm, c.t_s));
-      return;
-    }
-  }
-}
-
-void DynamicsService::take_commands() {
-  while (command_in_.take(incoming_)) {
-    if (incoming_.arm != scene_.arm) continue;
-    if (!fits(incoming_) || !owns(incoming_) || (command_step_ && incoming_.step <= *command_step_)) {
-      ++commands_refused_;
-      continue;
-    }
-    command_ = incoming_.torque;
-    command_step_ = incoming_.step;
-    command_includes_gravity_ = incoming_.includes_gravity;
-    planner_state_ = incoming_.planner_state;
-    state_.caused_by.size = 0;
-    state_.caused_by.add(wire::ServiceKind::planner, incoming_.step);
-  }
-}
-
-/// A command must be of our size and answer a state of this incarnation that was published, and in real time
-/// one that is not stale yet.
-bool DynamicsService::fits(const wire::TorqueCommand& c) {
-  if (c.torque.size() != command_.size()) {
-    if (refusals_(runtime::Clock::now()))
-      spdlog::warn("command for {} joints refused: arm {} has {}", c.torque.size(), scene_.arm,
-                   command_.size());
-    return false;
-  }
-  if (c.state_incarnation != incarnation_ || c.step > arm_.state().step) return false;
-  const double age_s = static_cast<double>(arm_.state().step - c.step) * scene_.dynamics.dt_s;
-  return config_.pace == scene::Pace::lockstep || age_s <= command_stale_s();
-}
-
-/// One planner drives the arm: the one with the largest epoch, of equals the one that has it.  Any other may
-/// take over once that one is silent.
-bool DynamicsService::owns(const wire::TorqueCommand& c) {
-  const bus::WriterId from = command_in_.from();
-  const bool stronger = from == owner_ ? c.epoch >= epoch_ : c.epoch > epoch_;
-  if (!stronger && !owner_is_silent()) {
-    if (from != owner_ && refusals_(runtime::Clock::now()))
-      spdlog::warn("another planner commands arm {} (epoch {}): refused, the one with epoch {} has it",
-                   scene_.arm, c.epoch, epoch_);
-    return false;
-  }
-  if (from != owner_) {
-    if (command_step_) spdlog::info("the planner with epoch {} takes arm {} over", c.epoch, scene_.arm);
-    driven_from_.reset();
-  }
-  owner_ = from;
-  epoch_ = c.epoch;
-  return true;
-}
-
-/// True when the planner that holds the arm has not been heard for longer than a command stays fresh: another
-/// may take over, whatever its epoch.
-bool DynamicsService::owner_is_silent() const {
-  if (!command_step_) return true;
-  if (config_.pace == scene::Pace::lockstep) return runtime::Clock::now() - waiting_since_ > 1s;
-  return command_age_s() > command_stale_s();
-}
-
-double DynamicsService::command_age_s() const {
-  return static_cast<double>(arm_.state().step - *command_step_) * scene_.dynamics.dt_s;
-}
-
-double DynamicsService::command_stale_s() const {
-  return std::max(std::chrono::duration<double>(topics::kCommand.stale).count(),
-                  3 * scene_.planner.period_steps * scene_.dynamics.dt_s);
-}
-
 bool DynamicsService::awaits_command() const {
   if (!scene_.steered) return false;
   const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
@@ -252,6 +156,9 @@ bool DynamicsService::poll_lockstep(Time now) {
     progressed = true;
   }
   if (progressed) return true;
+  if (now - waiting_since_ > 1s && refusals_(now))
+    spdlog::warn("step {} waits for the planner of arm {}, {:.0f} s so far", arm_.state().step, scene_.arm,
+                 std::chrono::duration<double>(now - waiting_since_).count());
   if (now - waiting_since_ > config_.patience) {
     end(Outcome::no_command, fmt::format("no planner answered step {} within {} s", arm_.state().step,
                                          std::chrono::duration<double>(config_.patience).count()));
@@ -416,50 +323,6 @@ void DynamicsService::close() {
   publish_clock(false);
   publish_summary(true);
   publish_status(wire::ServiceState::stopping);
-}
-
-void DynamicsService::save() {
-  if (!checkpoint_) return;
-  runtime::Packer p(packed_);
-  const State& s = arm_.state();
-  p.put(fingerprint_);
-  p.put(incarnation_);
-  p.put(s.step);
-  p.put(s.q.data(), static_cast<std::size_t>(s.q.size()));
-  p.put(s.p.data(), static_cast<std::size_t>(s.p.size()));
-  p.put(s.qd.data(), static_cast<std::size_t>(s.qd.size()));
-  p.put(s.history.data(), s.history.size());
-  p.put(arm_.books());
-  p.put(hash_.digest());
-  p.put(mode_.has_value() ? static_cast<std::int32_t>(*mode_) : -1);
-  p.put(mode_id_);
-  const Eigen::VectorXd* held = arm_.held();
-  p.put(held ? held->data() : nullptr, held ? static_cast<std::size_t>(held->size()) : 0);
-  checkpoint_->save(packed_);
-}
-
-bool DynamicsService::load(std::span<const std::byte> bytes) {
-  runtime::Unpacker u(bytes);
-  std::uint64_t print = 0, incarnation = 0, mode_id = 0;
-  State s;
-  Books books;
-  TrajectoryHash::Digest digest;
-  std::int32_t mode = -1;
-  Eigen::VectorXd held;
-  const bool whole = u.get(print) && u.get(incarnation) && u.get(s.step) && u.get_doubles(s.q) &&
-                     u.get_doubles(s.p) && u.get_doubles(s.qd) && u.get_doubles(s.history) && u.get(books) &&
-                     u.get(digest) && u.get(mode) && u.get(mode_id) && u.get_doubles(held) && u.at_end();
-  const Eigen::Index n = arm_.state().q.size();
-  if (!whole || print != fingerprint_ || s.q.size() != n || s.p.size() != n || s.qd.size() != n ||
-      (held.size() != 0 && held.size() != n))
-    return false;
-  incarnation_ = incarnation;
-  arm_.restore(s, books, held.size() == n ? &held : nullptr);
-  hash_.restore(digest);
-  if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
-  mode_id_ = mode_id;
-  spdlog::info("resumed at step {} (t = {:.3f} s)", arm_.state().step, arm_.t_s());
-  return true;
 }
 
 }  // namespace hamel::dynamics

@@ -68,6 +68,7 @@ class DynamicsService final : public runtime::Service {
   void publish_status(wire::ServiceState state);
   void publish_periodic(Time now);
   void end(Outcome outcome, const std::string& why);
+  Result<std::unique_ptr<runtime::Checkpoint>, Problem> open_checkpoint();
   void save();
   bool load(std::span<const std::byte> bytes);
 

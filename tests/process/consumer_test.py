@@ -36,7 +36,7 @@ class Foreign(unittest.TestCase):
             arm.kill()
             arm.wait()
         self.assertEqual(arm.returncode, 0, err)
-        return done
+        self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_in_real_time_over_both_vendors(self):
         for i, vendor in enumerate(("cyclonedds", "fastdds")):
