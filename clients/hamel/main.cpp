@@ -6,6 +6,7 @@
 #include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/figures.h"
+#include "clients/hamel/network_verbs.h"
 #include "clients/hamel/plot.h"
 #include "clients/hamel/record.h"
 #include "clients/hamel/replay.h"
@@ -239,10 +240,12 @@ int verbs(int argc, char** argv) {
 
   RecordVerbs recordings(app);
   client::BenchVerb bench(app);
+  const client::NetworkVerbs network(app);  // adds to bench
 
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   if (const auto code = recordings.run()) return *code;
   if (const auto code = bench.run()) return *code;
+  if (const auto code = network.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (figures->parsed()) return client::figures(figures_args);
   if (trade->parsed()) return client::trade(trade_args);

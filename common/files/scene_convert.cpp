@@ -96,6 +96,7 @@ void read_dynamics(const Fields& read, scene::DynamicsOptions& o, std::string& b
   read("max_subdivisions", o.max_subdivisions);
   read("stop_stiffness", o.stop_stiffness);
   read("space", o.space);
+  read("on_silence", o.on_silence);
   read("bus", bus);
 }
 

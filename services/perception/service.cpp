@@ -11,6 +11,7 @@ namespace hamel::perception {
 using namespace std::chrono_literals;
 
 namespace {
+constexpr auto kClockHeard = 200ms;
 constexpr std::uint64_t kNever = ~std::uint64_t{0};
 
 std::int64_t number(std::uint64_t k) { return static_cast<std::int64_t>(k); }
@@ -27,9 +28,8 @@ PerceptionService::PerceptionService(bus::Node& node, const scene::Scene& scene,
     : arm_(scene.arm),
       source_(std::move(source)),
       sets_out_(node),
-      status_out_(node),
       clock_in_(node),
-      bus_name_(bus::to_string(node.options().vendor)) {
+      presence_(node, wire::ServiceKind::perception, scene.arm) {
   set_.source = scene.arm;
   set_.incarnation = 1;
 }
@@ -56,6 +56,10 @@ bool PerceptionService::hear_clock(Time now) {
   wire::SimulationClock c;
   while (clock_in_.take(c)) {
     if (c.arm != arm_) continue;
+    // Two arms of one key: the one that is known stays, as long as it is heard.
+    const bus::WriterId from = clock_in_.from();
+    if (clock_ && from != clock_writer_ && now - clock_heard_ < kClockHeard) continue;
+    clock_writer_ = from;
     const bool again = clock_ && c.incarnation == clock_->incarnation && c.step == clock_->step && c.running;
     const bool anew = !clock_ || c.incarnation != clock_->incarnation || c.step < clock_->step;
     if (again) ++repeated_;
@@ -135,17 +139,12 @@ runtime::Clock::time_point PerceptionService::due() const {
 
 void PerceptionService::publish_status(Time now, wire::ServiceState state) {
   last_status_ = now;
-  wire::ServiceStatus s;
-  s.kind = wire::ServiceKind::perception;
-  s.arm = arm_;
-  s.incarnation = set_.incarnation;
-  s.version = runtime::version();
-  s.idl_hash = wire::idl_hash();
-  s.bus = bus_name_;
-  s.state = state;
-  s.detail = source_.is_static() ? "static obstacles" : "moving obstacles";
-  s.counters = {{"sets", published_}, {"repeated", repeated_}, {"undecodable", clock_in_.undecodable()}};
-  status_out_.publish(s);
+  presence_.say(
+      now, {.state = state,
+            .incarnation = set_.incarnation,
+            .detail = source_.is_static() ? "static obstacles" : "moving obstacles",
+            .counters = {
+                {"sets", published_}, {"repeated", repeated_}, {"undecodable", clock_in_.undecodable()}}});
 }
 
 void PerceptionService::close() { publish_status(runtime::Clock::now(), wire::ServiceState::stopping); }

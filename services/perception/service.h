@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/runtime/loop.h"
+#include "common/runtime/presence.h"
 #include "common/scene/scene.h"
 #include "common/wire/endpoint.h"
 #include "services/perception/core/source.h"
@@ -51,12 +52,12 @@ class PerceptionService final : public runtime::Service {
   const std::uint32_t arm_;
   const Source source_;
   wire::Publisher<wire::ObstacleSet> sets_out_;
-  wire::Publisher<wire::ServiceStatus> status_out_;
   wire::Subscription<wire::SimulationClock> clock_in_;
-  std::string bus_name_;
+  runtime::Presence presence_;
 
   wire::ObstacleSet set_;
   std::optional<wire::SimulationClock> clock_;
+  bus::WriterId clock_writer_{};
   Time clock_heard_{}, last_status_{};
   std::optional<std::uint64_t> next_;  ///< number of the next set; none: not begun
   std::uint64_t published_ = 0, repeated_ = 0;

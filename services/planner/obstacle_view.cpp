@@ -12,10 +12,19 @@ constexpr std::size_t kMaxSources = 16;
 
 }  // namespace
 
+void ObstacleView::begin(std::uint64_t incarnation) {
+  incarnation_ = incarnation;
+  std::erase_if(sources_, [&](const auto& s) {
+    return s.second.empty() || s.second.front().incarnation < incarnation;
+  });
+}
+
 void ObstacleView::add(const wire::ObstacleSet& set) {
+  if (set.incarnation < incarnation_) return;
   if (!sources_.contains(set.source) && sources_.size() >= kMaxSources) return;
   Queue& q = sources_[set.source];
-  if (!q.empty() && set.incarnation != q.back().incarnation) q.clear();
+  if (!q.empty() && set.incarnation < q.back().incarnation) return;
+  if (!q.empty() && set.incarnation > q.back().incarnation) q.clear();
   const auto at = std::lower_bound(q.begin(), q.end(), set.t_s,
                                    [](const wire::ObstacleSet& s, double t_s) { return s.t_s < t_s; });
   if (at != q.end() && at->t_s == set.t_s) {
@@ -30,8 +39,9 @@ void ObstacleView::add(const wire::ObstacleSet& set) {
 
 bool ObstacleView::covers(double t_s) const {
   if (sources_.empty()) return false;
-  return std::all_of(sources_.begin(), sources_.end(), [t_s](const auto& source) {
-    return std::any_of(source.second.begin(), source.second.end(),
+  return std::all_of(sources_.begin(), sources_.end(), [t_s, this](const auto& source) {
+    return current(source.second) &&
+           std::any_of(source.second.begin(), source.second.end(),
                        [t_s](const wire::ObstacleSet& s) { return s.t_s <= t_s && t_s < s.next_t_s; });
   });
 }
@@ -42,7 +52,7 @@ double ObstacleView::at(double t_s, std::vector<geometry::Obstacle>& out, wire::
   bool any = false;
   for (auto& [source, q] : sources_) {
     while (q.size() > 1 && q[1].t_s <= t_s) q.pop_front();
-    if (q.empty()) continue;
+    if (!current(q)) continue;
     any = true;
     const wire::ObstacleSet& s = q.front();
     out.insert(out.end(), s.obstacles.begin(), s.obstacles.end());

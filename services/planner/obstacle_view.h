@@ -14,6 +14,10 @@ namespace hamel::planner {
 
 class ObstacleView {
  public:
+  /// Knows sets of this incarnation of the arm only, from now on: those of an earlier one are forgotten and
+  /// not taken any more, those of a later one wait for it.
+  void begin(std::uint64_t incarnation);
+
   /// Keeps a set until a newer one covers its time.  A set older than one already used, or one that is held
   /// already, is passed over; a raised incarnation starts its source afresh.
   void add(const wire::ObstacleSet& set);
@@ -26,10 +30,10 @@ class ObstacleView {
   /// the oldest of them [s], 0 for sets that promised no successor, +inf where there is none.
   double at(double t_s, std::vector<geometry::Obstacle>& out, wire::Causes& causes);
 
-  bool empty() const { return sources_.empty(); }
-
  private:
-  using Queue = std::deque<wire::ObstacleSet>;  // ordered by time
+  using Queue = std::deque<wire::ObstacleSet>;  // ordered by time, of one incarnation
+  bool current(const Queue& q) const { return !q.empty() && q.front().incarnation == incarnation_; }
+  std::uint64_t incarnation_ = 0;
   std::map<std::uint32_t, Queue> sources_;
 };
 
