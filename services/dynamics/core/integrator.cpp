@@ -85,7 +85,7 @@ class Arm final : public Integrator::Impl {
 
   State start(const VectorXd& q0, const VectorXd& qd0) const override { return marcher_.start(q0, qd0); }
   StepReport step(State& state, const VectorXd& tau) noexcept override {
-    if (!marcher_.acceptable(state) || tau.size() != axis_.n() || !tau.allFinite()) return {};
+    if (!marcher_.acceptable(state) || tau.size() != axis_.n() || !all_finite(tau)) return {};
     load_.tau = tau;
     return marcher_.step(state, load_);
   }
