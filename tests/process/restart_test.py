@@ -70,7 +70,7 @@ class Restart(unittest.TestCase):
         random_ = random.Random(seed)
         with tempfile.TemporaryDirectory() as folder:
             recording = os.path.join(folder, "run.mcap")
-            with Up(scene(name), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 12 + 1.6 * count,
+            with Up(scene(name), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 9 + 1.5 * count,
                     "--domain", domain, "--record", recording, *extra) as up:
                 up.child("dynamics")
                 time.sleep(1.5)
@@ -210,7 +210,7 @@ class Alone(unittest.TestCase):
         self.assertEqual(o["outcome"], "REACHED", err)
 
     def test_a_second_planner_is_refused_and_named_and_a_stronger_one_takes_over(self):
-        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 20,
+        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 14,
                 "--domain", 79) as up:
             up.child("dynamics")
             for strength in ("0", "5"):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """DDS Security: with the identities of deploy/security/make the arm moves; without one, or with another's, nobody is heard."""
 
+import json
 import pathlib
 import subprocess
 import tempfile
@@ -51,6 +52,12 @@ class Security(unittest.TestCase):
                 s.terminate()
             for s in services:
                 s.wait(20)
+
+    def test_hamel_up_gives_each_service_its_own(self):
+        code, out, err = hamel("up", scene("four_link_avoid"), "--lockstep", "--duration", 0.2, "--set", "stop=at_duration",
+                               "--domain", 97, "--security", self.keys, "--json")
+        self.assertEqual(code, 3, err)  # not reached in so short a time
+        self.assertEqual(json.loads(out)["steps"], 200, err)
 
     def test_fastdds(self):
         self.keeps_strangers_out("fastdds", 94)
