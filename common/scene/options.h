@@ -34,7 +34,7 @@ struct DynamicsOptions {
   int max_subdivisions = 6;      ///< a step that does not converge is halved up to this often, 0..20
   double stop_stiffness =
       0;  ///< smooth hard stops at joint limits: k e^2/(e + 1e-3) at e beyond [N m/rad], 0: none
-  Safe on_silence = Safe::hold;  ///< what the arm does while its planner is silent
+  Safe on_silence = Safe::hold;    ///< what the arm does while its planner is silent
   Space space = Space::automatic;  ///< a planar arm is computed on SE(2), unless se3 is asked for
 };
 
