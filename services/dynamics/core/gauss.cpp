@@ -40,10 +40,9 @@ GaussStep<G>::GaussStep(const Chain& chain, const Options& options, Lanes lanes)
       inertia_(VectorXd::Zero(chain.n())),
       u_(inertia_),
       p_next_(inertia_),
-      scratch_(8 * lane_bytes<G>(chain.n()) + 64) {
+      scratch_(scratch_bytes<G>(chain.n()) + 64) {
   const auto start = reinterpret_cast<std::uintptr_t>(scratch_.data());
   job_.scratch = scratch_.data() + (64 - start % 64) % 64;
-  job_.lane_bytes = lane_bytes<G>(chain.n());
   job_.chain = &chain_;
   job_.stop_stiffness = options_.stop_stiffness;
   job_.stages = stages_, job_.padded = padded_;
@@ -84,19 +83,22 @@ void GaussStep<G>::guess(Stages& x) noexcept {
 
 template <class G>
 void GaussStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noexcept {
-  from_ = &from, load_ = &load, h_ = h;
+  from_ = &from, load_ = &load, h_ = h, mismatch_ = 0;
   for (int i = 0; i < chain_.n(); ++i) inertia_[i] = 1 / from.factor[at(i)].D_inv;
-  job_.load = &load, job_.tau = load.tau.data(), job_.h = h, job_.fresh = true;
+  job_.load = &load, job_.tau = load.tau.data(), job_.h = h;
   job_.q = from.q.data(), job_.p = from.p.data();
 }
 
+/// What follows from x is nearer to the root than x by the rate at which the mismatch falls: the residual is
+/// what it would be there.
 template <class G>
 Residual GaussStep<G>::evaluate(const Stages& x) noexcept {
   job_.V = x.V.data(), job_.F = x.F.data();
   job_.V_next = next_.V.data(), job_.F_next = next_.F.data();
   kernel_(job_);
-  job_.fresh = false;
-  return {job_.torque_Nm, job_.relative};
+  const double rate = mismatch_ > 0 ? std::min(1.0, job_.relative / mismatch_) : 1;
+  mismatch_ = job_.relative;
+  return {job_.torque_Nm, job_.relative * rate};
 }
 
 /// A joint's damping c meets its own inertia D: where x follows from F - c V, forces that oppose the change
@@ -138,6 +140,7 @@ StepReport GaussStep<G>::advance(const Node<G>& from, const Load<G>& load, doubl
   begin(from, load, h);
   guess(x_);
   contraction_ = Contraction(chain_.n());
+  contraction_.look_no_further();
   StepReport report = find_root(*this, options_, contraction_, x_);
   if (report.iterations < report.evaluations) correct(x_);  // what follows from x is nearer to the root
   report.evaluations *= stages_;
