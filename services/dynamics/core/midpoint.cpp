@@ -12,8 +12,6 @@ namespace {
 /// mass matrix is factorised with them, once more a step.
 constexpr double kExtraShare = 0.02;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
 template <class G>
