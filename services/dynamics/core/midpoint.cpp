@@ -25,8 +25,6 @@ constexpr double kResolved = 0.25;
 /// After some steps by Newton feedback is tried again; a rate not seen for some steps is looked at again.
 constexpr double kForget = 0.9, kAge = 1.25;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Torque of damping and stops.
 double resistance(const rbd::JointNumbers& k, double rate, double stiffness, double q) {
   return (stiffness > 0 ? stop_torque(k, stiffness, q) : 0) - k.damping * rate;
