@@ -91,7 +91,9 @@ TEST(Judge, AnArmThatStandsCausesNothing) {
   for (int k = 0; k <= 100 && !c; ++k) {
     const double t = 0.01 * k;
     c = judge.advance(t, q, std::vector{test::sphere(1, {0.5, 1 - t, 0}, 0.1)});
-    if (c) EXPECT_NEAR(t, 0.85, 0.011);
+    if (c) {
+      EXPECT_NEAR(t, 0.85, 0.011);
+    }
   }
   ASSERT_NE(c, nullptr);
   EXPECT_FALSE(c->arm_caused);
@@ -131,7 +133,8 @@ TEST(BenchSubset, GyroReachesAndTouchesNothing) {
   const auto robots = bench_robots(ArmModel::prototype);
   ASSERT_TRUE(robots);
   for (const auto& [family, spheres, scenes, least] :
-       {std::tuple{"panda_static", 8, 30, 27}, {"panda_moving", 4, 30, 26}, {"planar_static", 4, 30, 28}}) {
+       {std::tuple{"panda_static", 8, 30, 27}, std::tuple{"panda_moving", 4, 30, 26},
+        std::tuple{"planar_static", 4, 30, 28}}) {
     const Cell cell{family, spheres, ""};
     int reached = 0, touched = 0;
     for (int k = 0; k < scenes; ++k) {

@@ -22,16 +22,17 @@ constexpr double kLimitHorizon = 0.5;  // joint rows begin so far from a limit [
 
 double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept {
   const geometry::Closest& c = pair.at;
-  if (!std::isfinite(c.centre_m)) return 0;
   const geometry::Obstacle& o = pair.item->now;
-  const double D = std::max(c.centre_m, kNearest_m);
-  const Vector3d v_axis = pair.v - omega_link.cross(c.on_link - c.on_axis);
   const Vector3d omega_o = o.V_WO.head<3>();
-  const Vector3d v_centre = o.V_WO.tail<3>() + omega_o.cross(c.on_axis + c.centre_m * pair.n - o.X_WO.p);
+  const bool flat = !std::isfinite(c.centre_m);  // the obstacle's face
+  if (flat && omega_o.isZero(0)) return 0;
+  const double apart = flat ? (c.on_obstacle - c.on_axis).norm() : c.centre_m;
+  const double D = std::max(apart, kNearest_m);
+  const Vector3d v_axis = pair.v - omega_link.cross(c.on_link - c.on_axis);
+  const Vector3d v_centre = o.V_WO.tail<3>() + omega_o.cross(c.on_axis + apart * pair.n - o.X_WO.p);
   const Vector3d w = v_centre - v_axis;
   // A face that turns: d = n.(y - x) with a normal of the link's or of the obstacle's own.
-  const bool faces = !c.link_axis2.isZero() || !c.obstacle_axis2.isZero();
-  if (faces) {
+  if (flat || !c.link_axis2.isZero() || !c.obstacle_axis2.isZero()) {
     const Vector3d turn = (c.link_axis2.isZero() ? omega_o : omega_link).cross(pair.n);
     return 2 * turn.dot(w) - D * turn.squaredNorm();
   }

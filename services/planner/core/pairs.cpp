@@ -285,9 +285,10 @@ void Pairs::complete_self(const Arm& arm, std::size_t k) noexcept {
 
 Vector3d Pairs::bias(const Arm& arm, const Pair& pair) const noexcept {
   Vector3d a = rbd::point_bias_acceleration(arm.chain, arm.ws, pair.link, pair.at.on_axis, arm.qd);
+  const bool flat = !std::isfinite(pair.at.centre_m);
+  const Vector3d there = flat ? pair.at.on_obstacle : Vector3d(pair.at.on_axis + pair.at.centre_m * pair.n);
   if (pair.other_link >= 0)
-    a -= rbd::point_bias_acceleration(arm.chain, arm.ws, pair.other_link,
-                                      pair.at.on_axis + pair.at.centre_m * pair.n, arm.qd);
+    a -= rbd::point_bias_acceleration(arm.chain, arm.ws, pair.other_link, there, arm.qd);
   return a;
 }
 
