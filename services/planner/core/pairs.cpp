@@ -143,7 +143,10 @@ void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
   clear();
   place(arm);
   for (const Body& body : bodies_) {
-    if (body.link < 0) continue;  // the base does not move: nothing to steer
+    if (body.link < 0) {
+      touch_base(body, obstacles);
+      continue;
+    }
     Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
     for (const Obstacles::Item& item : obstacles.items()) {
       const double bound = geometry::distance_bound(body.solid_W, item.solid);
@@ -170,6 +173,17 @@ void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
       options_.method != scene::Method::gyro && options_.pairs == scene::PairPolicy::nearest;
   if (only_nearest) keep_nearest_of_each_link();
   find_self(arm);
+}
+
+// The base does not move: there is nothing to steer, but who runs into it has touched the arm.  What stands
+// touches it by design.
+void Pairs::touch_base(const Body& base, const Obstacles& obstacles) noexcept {
+  for (const Obstacles::Item& item : obstacles.items()) {
+    const bool stands = item.now.velocity_known && item.now.V_WO.isZero(0);
+    if (stands || geometry::distance_bound(base.solid_W, item.solid) > 0) continue;
+    const double d = geometry::closest(base.solid_W, item.solid).distance_m;
+    if (d < 0) clearance_m_ = std::min(clearance_m_, d);
+  }
 }
 
 // Pairs of two links: the one nearer to the base stands for the obstacle, with the twist it has.

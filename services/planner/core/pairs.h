@@ -121,12 +121,6 @@ class Pairs {
   double tip_radius_m() const noexcept { return tip_radius_m_; }
 
  private:
-  void place(const Arm& arm) noexcept;
-  void find_self(const Arm& arm) noexcept;
-  void offer(const Pair& pair) noexcept;
-  void complete_self(const Arm& arm, std::size_t k) noexcept;
-  void keep_nearest_of_each_link() noexcept;
-
   struct Body {
     int index = 0, link = 0;
     geometry::Solid solid_B, solid_W;
@@ -135,6 +129,13 @@ class Pairs {
   struct Own {
     std::size_t a = 0, b = 0;
   };
+  void place(const Arm& arm) noexcept;
+  void touch_base(const Body& base, const Obstacles& obstacles) noexcept;
+  void find_self(const Arm& arm) noexcept;
+  void offer(const Pair& pair) noexcept;
+  void complete_self(const Arm& arm, std::size_t k) noexcept;
+  void keep_nearest_of_each_link() noexcept;
+
   const scene::PlannerOptions& options_;
   std::vector<Body> bodies_;
   std::vector<Own> own_;
