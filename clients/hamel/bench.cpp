@@ -11,7 +11,9 @@
 
 #include "clients/hamel/batch.h"
 #include "clients/hamel/bench_output.h"
+#include "clients/hamel/bench_streams.h"
 #include "clients/hamel/gnuplot.h"
+#include "clients/hamel/problems.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
@@ -22,10 +24,6 @@ namespace hamel::client {
 namespace {
 
 using scene::Method;
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 /// One line on stderr: overwritten on a terminal, else a line each ten seconds.
 class Progress {
@@ -57,12 +55,16 @@ class Progress {
 /// Everything that is decided before the first trial.
 struct Plan {
   std::vector<Cell> cells;
+  std::vector<std::vector<scene::Scene>> given;           ///< [cell] the scenes, where they are not drawn
+  std::vector<std::pair<std::size_t, std::size_t>> jobs;  ///< (cell, scene)
   std::vector<Method> methods;
   std::vector<std::string> method_names;
   std::vector<std::vector<scene::PlannerOptions>> options;  ///< [cell][method]
   std::vector<BenchRobots> robots;                          ///< one
   ArmModel model = ArmModel::prototype;
 };
+
+}  // namespace
 
 /// Overrides that touch `method`: "planner.kc=1" all, "gyro.kc=1" one.
 std::vector<std::string> assignments(const std::vector<std::string>& overrides, const std::string& method) {
@@ -73,18 +75,19 @@ std::vector<std::string> assignments(const std::vector<std::string>& overrides, 
   return out;
 }
 
-Problems choose_methods(const BenchArgs& args, Plan& plan) {
+Problems choose_methods(const BenchArgs& args, std::vector<Method>& methods,
+                        std::vector<std::string>& names) {
   Problems found;
   for (const Method m : {Method::gyro, Method::gyro_paper, Method::khatib, Method::attract}) {
     const std::string name = scene::to_string(m);
     if (!args.methods.empty() &&
         std::find(args.methods.begin(), args.methods.end(), name) == args.methods.end())
       continue;
-    plan.methods.push_back(m);
-    plan.method_names.push_back(name);
+    methods.push_back(m);
+    names.push_back(name);
   }
   for (const std::string& m : args.methods)
-    if (std::find(plan.method_names.begin(), plan.method_names.end(), m) == plan.method_names.end())
+    if (std::find(names.begin(), names.end(), m) == names.end())
       found.push_back({"--methods " + m, "is none of gyro, gyro_paper, khatib, attract"});
   for (const std::string& o : args.overrides) {
     const std::string head = o.substr(0, o.find('.'));
@@ -94,16 +97,33 @@ Problems choose_methods(const BenchArgs& args, Plan& plan) {
   return found;
 }
 
+namespace {
+
 Checked<Plan> make_plan(const BenchArgs& args) {
   Plan plan;
-  Problems found = choose_methods(args, plan);
-  auto chosen = cells(args.families, args.spheres);
-  if (!chosen) found.insert(found.end(), chosen.error().begin(), chosen.error().end());
+  Problems found = choose_methods(args, plan.methods, plan.method_names);
+  if (args.problems_folder.empty()) {
+    auto chosen = cells(args.families, args.spheres);
+    if (chosen)
+      plan.cells = std::move(chosen).value();
+    else
+      found.insert(found.end(), chosen.error().begin(), chosen.error().end());
+  }
   plan.model = args.model == "full" ? ArmModel::full : ArmModel::prototype;
   if (!args.plot_path.empty())
     if (const auto p = check_picture_name(args.plot_path)) found.push_back(*p);
   if (!found.empty()) return found;
-  plan.cells = std::move(chosen).value();
+  auto robots = bench_robots(plan.model);
+  if (!robots) return robots.error();
+  plan.robots.push_back(std::move(robots).value());
+  if (!args.problems_folder.empty()) {
+    auto sets = load_problems(args.problems_folder, plan.robots.front().panda);
+    if (!sets) return sets.error();
+    for (ProblemSet& set : sets.value()) {
+      plan.cells.push_back({set.name, 0, ""});
+      plan.given.push_back(std::move(set.scenes));
+    }
+  }
   for (const Cell& cell : plan.cells) {
     auto& row = plan.options.emplace_back();
     for (std::size_t k = 0; k < plan.methods.size(); ++k) {
@@ -112,9 +132,10 @@ Checked<Plan> make_plan(const BenchArgs& args) {
       if (!bad.empty()) return bad;
     }
   }
-  auto robots = bench_robots(plan.model);
-  if (!robots) return robots.error();
-  plan.robots.push_back(std::move(robots).value());
+  for (std::size_t c = 0; c < plan.cells.size(); ++c) {
+    const std::size_t scenes = plan.given.empty() ? args.scenes : plan.given[c].size();
+    for (std::size_t i = 0; i < scenes; ++i) plan.jobs.emplace_back(c, i);
+  }
   return plan;
 }
 
@@ -122,14 +143,13 @@ Checked<Plan> make_plan(const BenchArgs& args) {
 std::vector<Trial> try_scene(const BenchArgs& args, const Plan& plan, std::size_t cell, std::size_t index,
                              const std::function<bool()>& stop) {
   const BenchRobots& robots = plan.robots.front();
-  scene::Scene s = draw_scene(plan.cells[cell], robots, plan.model, args.seed, index);
+  scene::Scene s =
+      plan.given.empty() ? draw_scene(plan.cells[cell], robots, args.seed, index) : plan.given[cell][index];
   s.dynamics.dt_s = args.dt_s;
   TrialOptions o;
   o.velocities_known = !args.velocities_unknown;
   o.now_s = now_s;
   o.stop = stop;
-  if (plan.model == ArmModel::full && plan.cells[cell].family.starts_with("panda"))
-    o.self_pairs = robots.panda_self_pairs;
   std::vector<Trial> out;
   for (const scene::PlannerOptions& options : plan.options[cell]) {
     s.planner = options;
@@ -150,9 +170,14 @@ std::string settings_text(const BenchArgs& args) {
 
 }  // namespace
 
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 int bench_planner(const BenchArgs& args) {
   runtime::StopSignal stop;
   runtime::start_log("hamel", false);
+  if (!args.streams_folder.empty()) return bench_streams(args, [&stop] { return stop.requested(); });
   auto made = make_plan(args);
   if (!made) return runtime::complain("hamel bench", made.error());
   const Plan& plan = made.value();
@@ -160,25 +185,25 @@ int bench_planner(const BenchArgs& args) {
   std::vector<CellTally> all;
   for (const Cell& cell : plan.cells)
     all.push_back({cell, plan.method_names, std::vector<Tally>(plan.methods.size())});
-  const std::size_t jobs = plan.cells.size() * args.scenes;
   bool interrupted = false;
   {
-    Progress progress(jobs);
+    Progress progress(plan.jobs.size());
     const auto asked = [&stop] { return stop.requested(); };
-    Batch batch{.jobs = jobs};
+    Batch batch{.jobs = plan.jobs.size()};
     batch.workers =
         args.jobs > 0 ? args.jobs : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     batch.stop = asked;
     batch.progress = [&](std::size_t done) {
-      progress.say(done, label(plan.cells[(done - 1) / args.scenes]));
+      progress.say(done, label(plan.cells[plan.jobs[done - 1].first]));
     };
     run_batch(
-        batch, [&](std::size_t i) { return try_scene(args, plan, i / args.scenes, i % args.scenes, asked); },
+        batch,
+        [&](std::size_t i) { return try_scene(args, plan, plan.jobs[i].first, plan.jobs[i].second, asked); },
         [&](std::size_t i, std::vector<Trial> trials) {
           interrupted = interrupted || stop.requested();
           if (interrupted) return;  // the trial may have been cut short
           for (std::size_t k = 0; k < trials.size(); ++k)
-            all[i / args.scenes].tallies[k].add(i % args.scenes, trials[k]);
+            all[plan.jobs[i].first].tallies[k].add(plan.jobs[i].second, trials[k]);
         });
     interrupted = interrupted || stop.requested();
   }
@@ -213,6 +238,15 @@ BenchVerb::BenchVerb(CLI::App& app) {
   planner_->add_option("--methods", args_.methods, "gyro, gyro_paper, khatib, attract; several with commas")
       ->delimiter(',')
       ->type_name("NAME");
+  planner_
+      ->add_option("--problems", args_.problems_folder,
+                   "MoveIt's planning problems (scene*.yaml, request*.yaml) for the Panda instead")
+      ->type_name("DIR");
+  planner_
+      ->add_option("--streams", args_.streams_folder,
+                   "the Panda goes from goal to goal in front of recorded streams (*.csv) instead")
+      ->type_name("DIR")
+      ->excludes("--problems");
   planner_->add_option("--spheres", args_.spheres, "only the cells with so many spheres")
       ->delimiter(',')
       ->type_name("N");

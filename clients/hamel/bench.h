@@ -11,6 +11,8 @@ namespace hamel::client {
 
 struct BenchArgs {
   std::vector<std::string> families, methods;  ///< empty: all
+  std::string problems_folder;                 ///< MoveIt's problems instead of random scenes; empty: none
+  std::string streams_folder;                  ///< recorded obstacle streams instead; empty: none
   std::vector<int> spheres;                    ///< cells with these numbers of spheres; empty: all
   std::size_t scenes = 100;                    ///< of each cell
   std::uint64_t seed = 1;

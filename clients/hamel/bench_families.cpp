@@ -10,6 +10,7 @@
 #include "clients/hamel/robots.h"
 #include "common/files/urdf.h"
 #include "common/rbd/rbd.h"
+#include "common/scene/self_links.h"
 
 namespace hamel::client {
 
@@ -52,7 +53,7 @@ std::uint64_t hash(const std::string& text, std::uint64_t h) {
   return h;
 }
 
-bool is_planar(const Cell& cell) { return !cell.family.starts_with("panda"); }
+bool is_planar(const Cell& cell) { return cell.family.starts_with("planar") || cell.family == "example_5_2"; }
 bool is_moving(const Cell& cell) { return cell.family.ends_with("moving"); }
 
 /// What differs between the two arms' scenes.
@@ -65,7 +66,7 @@ struct Workshop {
   double duration_s;
 };
 constexpr Workshop kPlanar{0.5, 3.2, 0.20, 0.40, 0.10, 0.03, 1.0, 0.35, 15};
-constexpr Workshop kPanda{0.25, 0.80, 0.04, 0.11, 0.05, 0.02, 0.3, 0.10, 12};
+constexpr Workshop kPanda{0.25, 0.80, 0.04, 0.11, 0.05, 0.02, 0.3, 0.22, 12};
 
 scene::Scene empty_scene(const scene::Robot& robot) {
   scene::Scene s{"", "", 1, robot, {}, {}, {}, true, {}, {}, {}, {}, 10, scene::StopRule::when_reached};
@@ -91,13 +92,12 @@ VectorXd random_configuration(const model::Chain& chain, Dice& dice) {
 /// Draws until start, goal and obstacles fit together.
 class Drawing {
  public:
-  Drawing(const Cell& cell, const BenchRobots& robots, ArmModel model, std::uint64_t seed)
+  Drawing(const Cell& cell, const BenchRobots& robots, std::uint64_t seed)
       : cell_(cell),
         robot_(is_planar(cell) ? robots.planar : robots.panda),
         shop_(is_planar(cell) ? kPlanar : kPanda),
         dice_(seed),
-        judge_(robot_, model == ArmModel::full && !is_planar(cell) ? robots.panda_self_pairs
-                                                                   : std::vector<std::pair<int, int>>{}),
+        judge_(robot_),
         ws_(robot_.chain),
         scene_(empty_scene(robot_)) {
     shoulder_ = robot_.chain.X_WB0() * robot_.chain.joint(0).X_PJ.p;
@@ -180,15 +180,17 @@ class Drawing {
     return true;
   }
 
-  // Keeps away from what cannot give way: the line from the base to the second joint.
-  bool spares_base(const scene::ScriptedObstacle& o) const {
-    const Vector3d foot = robot_.chain.X_WB0().p, top = shoulder_;
+  // Keeps away from what cannot give way: the base, and what turns on the line from it to the second joint.
+  bool spares_base(scene::ScriptedObstacle o) {
+    const Vector3d foot = robot_.chain.X_WB0().p, up = shoulder_ - foot, start = o.at_start.X_WO.p;
     const double room = o.at_start.shape.dims_m[0] + shop_.base_clear_m;
     for (double t = 0; t <= shop_.duration_s; t += 0.02) {
-      const Vector3d c = o.at_start.X_WO.p + t * o.velocity_mps;
-      const double length = (top - foot).squaredNorm();
-      const double s = length > 0 ? std::clamp((c - foot).dot(top - foot) / length, 0.0, 1.0) : 0;
-      if ((c - foot - s * (top - foot)).norm() < room) return false;
+      const Vector3d c = start + t * o.velocity_mps;
+      const double s = up.isZero() ? 0 : std::clamp((c - foot).dot(up) / up.squaredNorm(), 0.0, 1.0);
+      if ((c - foot - s * up).norm() < room) return false;
+      o.at_start.X_WO.p = c;
+      const std::array one{o.at_start};
+      if ((c - foot).norm() < 1 && judge_.clearance_of_link(-1, scene_.q0, one) < 0.05) return false;
     }
     return true;
   }
@@ -296,17 +298,20 @@ Checked<BenchRobots> bench_robots(ArmModel model) {
   if (model == ArmModel::prototype) place.gravity_W_mps2.setZero();
   auto panda = files::parse_urdf(std::string(panda_urdf()), "panda.urdf", place);
   if (!panda) return panda.error();
-  BenchRobots robots{planar_arm(), std::move(panda).value(), {}};
-  if (model == ArmModel::prototype) lift_torque_limits(robots.panda);
+  BenchRobots robots{planar_arm(), std::move(panda).value()};
+  if (model == ArmModel::prototype) {
+    lift_torque_limits(robots.panda);
+    return robots;
+  }
+  robots.panda.self_links = scene::self_links(robots.panda).watched;
   return robots;
 }
 
-scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, ArmModel model, std::uint64_t seed,
-                        std::size_t index) {
+scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, std::uint64_t seed, std::size_t index) {
   std::uint64_t h = hash(cell.family, 1469598103934665603ull ^ (seed * 0x9e3779b97f4a7c15ull));
   h = hash(std::to_string(cell.spheres) + "/" + std::to_string(index), h);  // variants share their scenes
-  scene::Scene s = cell.family == "example_5_2" ? draw_example_5_2(robots.planar, h)
-                                                : Drawing(cell, robots, model, h).draw();
+  scene::Scene s =
+      cell.family == "example_5_2" ? draw_example_5_2(robots.planar, h) : Drawing(cell, robots, h).draw();
   s.name = cell.family + "_" + std::to_string(cell.spheres) + "_" + std::to_string(index);
   return s;
 }
@@ -327,6 +332,7 @@ scene::PlannerOptions settings(const Cell& cell, Method method) {
     o.kp = 30;
     o.kv = 11;
     o.vmax_mps = 0.5;
+    o.angular_vmax_radps = 1.5;
     o.damping = 1;
     o.rho0_m = 0.2;
     o.eta = 0.0002;

@@ -31,7 +31,6 @@ Checked<std::vector<Cell>> cells(const std::vector<std::string>& families, const
 /// The arms of the families; made once.
 struct BenchRobots {
   scene::Robot planar, panda;
-  std::vector<std::pair<int, int>> panda_self_pairs;
 };
 /// Four links of 1 m, slender rods of 1 kg, capsules of 5 cm; the Panda of deploy/robots.
 Checked<BenchRobots> bench_robots(ArmModel model);
@@ -44,8 +43,7 @@ Checked<BenchRobots> bench_robots(ArmModel model);
 /// between them is not proved. Moving spheres go straight on with 0.1 to 1 m/s; each passes a random place of
 /// the workspace within the first half of the run, none comes near the base, and none touches the start
 /// within half a second.
-scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, ArmModel model, std::uint64_t seed,
-                        std::size_t index);
+scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, std::uint64_t seed, std::size_t index);
 
 /// The settings of `method` in a cell: those of the design's tables; `gyro` is the default.
 scene::PlannerOptions settings(const Cell& cell, scene::Method method);

@@ -103,13 +103,18 @@ struct Judge::Impl {
     double due_m = 0;
   };
 
-  Impl(const scene::Robot& r, std::vector<std::pair<int, int>> self)
+  explicit Impl(const scene::Robot& r)
       : chain(r.chain), ws(chain), travel_m(static_cast<std::size_t>(chain.n()), 0.0) {
     for (const scene::LinkShape& s : r.shapes) {
       bodies.push_back({s.link, solid(s.shape), transform(s.shape, s.X_LS)});
       size_m.push_back(s.X_LS.p.norm() + extent(s.shape));
     }
-    for (const auto& [a, b] : self) self_pairs.push_back({a, b, 0});
+    for (int b = 0; b < static_cast<int>(bodies.size()); ++b)
+      for (int a = 0; a < static_cast<int>(bodies.size()); ++a) {
+        const std::pair links{bodies[static_cast<std::size_t>(a)].link,
+                              bodies[static_cast<std::size_t>(b)].link};
+        if (std::count(r.self_links.begin(), r.self_links.end(), links) > 0) self_pairs.push_back({a, b, 0});
+      }
     set_levers();
   }
 
@@ -250,7 +255,7 @@ bool Judge::Impl::look(double t_s, double share, const Eigen::VectorXd& q) {
     const Isometry3d X_WO = transform(at.shape, at.X_WO);
     for (std::size_t k = 0; k < bodies.size(); ++k) {
       const Body& b = bodies[k];
-      if (gone(b) + there < o.due_m[k]) continue;
+      if (gone(b) + there < o.due_m[k] || (b.link < 0 && there == 0)) continue;
       const double d = distance(b.solid, b.X_WS, o.solid, X_WO);
       clearance_min_m = std::min(clearance_min_m, d);
       o.due_m[k] = gone(b) + there + budget(d);
@@ -333,8 +338,7 @@ const Contact* Judge::Impl::advance(double t_s, const Eigen::VectorXd& q,
   return clear ? nullptr : &contact;
 }
 
-Judge::Judge(const scene::Robot& robot, std::vector<std::pair<int, int>> self_pairs)
-    : impl_(std::make_unique<Impl>(robot, std::move(self_pairs))) {}
+Judge::Judge(const scene::Robot& robot) : impl_(std::make_unique<Impl>(robot)) {}
 Judge::~Judge() = default;
 Judge::Judge(Judge&&) noexcept = default;
 

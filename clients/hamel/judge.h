@@ -34,12 +34,12 @@ struct Contact {
 /// most 1 mm or 10 % above the true one.
 ///
 /// Shapes are those of the robot as they are (sphere, capsule, cylinder, box), not what a planner makes of
-/// them. Half-spaces stand as boxes of 100 m.  Not for two threads at once.
+/// them. The base is looked at against what moves only.  Half-spaces stand as boxes of 100 m.  Not for two
+/// threads at once.
 class Judge {
  public:
-  /// @param self_pairs  shapes (indices of robot.shapes) that must not touch each other; empty: none are
-  /// looked at
-  explicit Judge(const scene::Robot& robot, std::vector<std::pair<int, int>> self_pairs = {});
+  /// Links of robot.self_links must not touch each other either.
+  explicit Judge(const scene::Robot& robot);
   ~Judge();
   Judge(Judge&&) noexcept;
 

@@ -12,17 +12,17 @@ namespace hamel::client {
 
 namespace {
 
+constexpr double kPatience_s = 20;  // for one goal of a cycle
 constexpr double kFirstBin_s = 1e-8, kBinRatio = 1.08;
 
 /// Distance to the goal as the user means it, from the arm's state alone.
 class Arrival {
  public:
-  explicit Arrival(const scene::Scene& s) : scene_(s), ws_(s.robot.chain) {}
+  explicit Arrival(const scene::Scene& s) : goal(*s.goal), scene_(s), ws_(s.robot.chain) {}
 
   /// True once the goal has been held long enough.
   bool update(double t_s, const Eigen::VectorXd& q, const Eigen::VectorXd& qd) {
     const scene::PlannerOptions& o = scene_.planner;
-    const scene::Goal& goal = *scene_.goal;
     rbd::velocities(scene_.robot.chain, q, qd, ws_);
     const lie::Pose X_WE = rbd::tip(scene_.robot.chain, ws_);
     if (known_) path_m += (X_WE.p - tip_).norm();
@@ -37,7 +37,7 @@ class Arrival {
       within = error_m <= o.goal_tolerance_joint;
       speed = qd.lpNorm<Eigen::Infinity>();
     } else {
-      error_m = (goal.X_WG.p + t_s * goal.V_WG.tail<3>() - tip_).norm();
+      error_m = (goal.X_WG.p + (t_s - begun_s) * goal.V_WG.tail<3>() - tip_).norm();
       within = error_m <= o.goal_tolerance_m;
       if (goal.kind == scene::GoalKind::pose)
         within &= Eigen::AngleAxisd(goal.X_WG.R * X_WE.R.transpose()).angle() <= o.goal_tolerance_rad;
@@ -49,7 +49,15 @@ class Arrival {
     return since_s >= 0 && t_s - since_s >= o.goal_hold_s;
   }
 
-  double error_m = 0, path_m = 0, since_s = -1;
+  /// From now on another goal.
+  void aim(const scene::Goal& next, double t_s) {
+    goal = next;
+    since_s = -1;
+    begun_s = t_s;
+  }
+
+  scene::Goal goal;
+  double error_m = 0, path_m = 0, since_s = -1, begun_s = 0;
 
  private:
   const scene::Scene& scene_;
@@ -98,9 +106,10 @@ class Run {
         arm_(scene),
         planner_(scene.robot, scene.planner),
         out_(planner_.output()),
-        judge_(scene.robot, options.self_pairs),
+        judge_(scene.robot),
         arrival_(scene) {
-    planner_.set_goal(*scene.goal);
+    if (!options.cycle.empty()) arrival_.aim(options.cycle.front(), 0);
+    planner_.set_goal(arrival_.goal);
     truth_.reserve(source.most_obstacles());
     qd_before_ = scene.qd0;
     qdd_before_ = Eigen::VectorXd::Zero(scene.qd0.size());
@@ -133,23 +142,38 @@ class Run {
   }
 
  private:
-  // The truth at this state: touched, or arrived.
+  // The truth at this state: touched, or arrived.  True where that ends the trial.
   bool observe() {
     const double t_s = arm_.t_s();
     if (!source_.at(t_s, truth_)) truth_.clear();
-    if (const Contact* c = judge_.advance(t_s, arm_.state().q, truth_)) {
+    const Contact* c = judge_.advance(t_s, arm_.state().q, truth_);
+    const bool arrived = arrival_.update(t_s, arm_.state().q, arm_.state().qd);
+    if (!options_.cycle.empty()) return count(c, arrived), false;
+    if (c) {
       trial_.contact = *c;
       trial_.ending = Ending::collided;
       plan();
       trial_.contact_reported = out_.report.reason == planner::Reason::contact;
-      return over_ = true;
-    }
-    if (arrival_.update(t_s, arm_.state().q, arm_.state().qd)) {
+    } else if (arrived) {
       trial_.ending = Ending::reached;
       trial_.time_s = arrival_.since_s;
-      return over_ = true;
     }
-    return false;
+    return over_ = c || arrived;
+  }
+
+  // Contacts and goals of a cycle.
+  void count(const Contact* c, bool arrived) {
+    if (c && !touching_) {
+      ++(c->arm_caused ? trial_.contacts_by_arm : trial_.contacts_by_others);
+      if (!trial_.contact || c->arm_caused) trial_.contact = *c;
+    }
+    touching_ = c != nullptr;
+    if (!arrived && arm_.t_s() - arrival_.begun_s < kPatience_s) return;
+    ++(arrived ? trial_.goals_reached : trial_.goals_missed);
+    scene::Goal next = options_.cycle[++goals_ % options_.cycle.size()];
+    next.id = goals_ + 1;
+    arrival_.aim(next, arm_.t_s());
+    planner_.set_goal(next);
   }
 
   void plan() {
@@ -166,6 +190,8 @@ class Run {
     planner_.plan(in, out_);
     if (options_.now_s) trial_.cycle.add(options_.now_s() - began_s);
     ++trial_.cycles;
+    trial_.unsafe_cycles += out_.report.state == planner::State::unsafe;
+    trial_.unreported_contacts += touching_ && out_.report.reason != planner::Reason::contact;
     trial_.infeasible_cycles += out_.report.reason == planner::Reason::infeasible;
   }
 
@@ -188,7 +214,8 @@ class Run {
   std::vector<geometry::Obstacle> truth_;
   Eigen::VectorXd qd_before_, qdd_before_, qdd_;
   Trial trial_;
-  bool over_ = false;
+  std::uint64_t goals_ = 0;
+  bool over_ = false, touching_ = false;
 };
 
 }  // namespace
@@ -222,7 +249,7 @@ const char* to_string(Ending v) {
 
 Trial run_trial(const scene::Scene& scene, const TrialOptions& options) {
   const auto source = perception::Source::make(scene.perception);
-  if (!source || !scene.goal) return {};
+  if (!source || !scene.goal) return {};  // problems(scene) would have said so
   return Run(scene, options, source.value()).run();
 }
 

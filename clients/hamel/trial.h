@@ -37,9 +37,11 @@ struct TrialOptions {
   /// Obstacles are known at every cycle as they are then; else only at the set times of perception.
   bool perfect_perception = true;
   bool velocities_known = true;
-  std::vector<std::pair<int, int>> self_pairs = {};  ///< judged too
-  std::function<double()> now_s = {};                ///< clock for cycle times; empty: not timed
-  std::function<bool()> stop = {};                   ///< asked now and then; true: the trial ends as failed
+  /// Not empty: one after the other for ever, each given up after 20 s; contacts are counted and do not end
+  /// the trial.  Else the scene's goal alone.
+  std::vector<scene::Goal> cycle = {};
+  std::function<double()> now_s = {};  ///< clock for cycle times; empty: not timed
+  std::function<bool()> stop = {};     ///< asked now and then; true: the trial ends as failed
 };
 
 /// How a trial went, all of it measured from the arm's states and not taken from the planner's report, but
@@ -56,12 +58,16 @@ struct Trial {
   planner::Reason reason = planner::Reason::none;  ///< the planner's last one
   std::uint64_t infeasible_cycles = 0;             ///< the planner reported infeasible
   std::uint64_t cycles = 0, saturated_steps = 0;
-  double jerkiness = 0;  ///< total variation of qdd [rad/s^2 per s]
+  int goals_reached = 0, goals_missed = 0;                   ///< of a cycle of goals
+  int contacts_by_arm = 0, contacts_by_others = 0;           ///< each counted once, where it begins
+  std::uint64_t unsafe_cycles = 0, unreported_contacts = 0;  ///< the planner said UNSAFE; did not say contact
+  double jerkiness = 0;                                      ///< total variation of qdd [rad/s^2 per s]
   Durations cycle;
 };
 
 /// Runs `scene` until it is reached, something touches, or its duration is over.
 ///
+/// A cycle of goals ends at the duration, timed_out.
 /// Reached: position goals within goal_tolerance_m below goal_speed for goal_hold_s; pose and joint goals
 /// with their tolerances.  Stuck: not reached and the planner's last state is STUCK.  Failed: the integrator
 /// refused a step, or the planner asked for a number that is not finite.

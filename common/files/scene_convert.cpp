@@ -141,6 +141,7 @@ void read_planner(const Fields& read, scene::PlannerOptions& o, std::string& bus
   read("stale_state_s", o.stale_state_s);
   read("brake_rate", o.brake_rate);
   read("ramp_s", o.ramp_s);
+  read("unreachable", o.unreachable);
   read("bus", bus);
 }
 
@@ -268,6 +269,14 @@ void read_place(const text::Scene& m, SceneParts& out) {
   robot.require("urdf");
   robot("tip", out.place.tip);
   robot.pose(out.place.X_WB0);
+  if (m.robot().has_self_collision()) out.self_collision = m.robot().self_collision();
+  for (int i = 0; i < m.robot().allowed_contact_size(); ++i) {
+    const text::AllowedContact& pair = m.robot().allowed_contact(i);
+    if (pair.link_size() == 2)
+      out.allowed_contacts.emplace_back(pair.link(0), pair.link(1));
+    else
+      out.missing.push_back({"robot.allowed_contact[" + std::to_string(i) + "]", "must name two links"});
+  }
   if (!out.place.X_WB0.p.allFinite() || !out.place.X_WB0.R.allFinite())
     out.missing.push_back({"robot.position_m", "or rpy_rad has a number that is not finite"});
   const Fields read(m, "", out.missing);

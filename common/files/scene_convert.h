@@ -17,6 +17,8 @@ struct SceneParts {
   std::string name;
   std::uint32_t arm = 1;
   RobotPlace place;
+  std::optional<bool> self_collision;
+  std::vector<std::pair<std::string, std::string>> allowed_contacts;
   std::optional<Eigen::VectorXd> q0, qd0;
   std::optional<scene::Goal> goal;
   bool steered = true;

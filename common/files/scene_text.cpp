@@ -9,6 +9,8 @@
 #include "common/files/stream.h"
 #include "common/files/text_fields.h"
 #include "common/files/urdf.h"
+#include "common/rbd/planar_chain.h"
+#include "common/scene/self_links.h"
 
 namespace hamel::files {
 namespace {
@@ -88,12 +90,33 @@ class Loader {
     return {};
   }
 
+  /// Which links must not touch each other, from the scene's word and the shapes.
+  void watch_links(const SceneParts& parts, scene::Robot& robot) {
+    std::vector<std::pair<int, int>> allowed;
+    const auto index = [&](const std::string& name) {
+      for (int i = 0; i < robot.chain.n(); ++i)
+        if (robot.chain.link(i).name == name) return i;
+      return name == "base" ? -1 : robot.chain.n();
+    };
+    for (std::size_t k = 0; k < parts.allowed_contacts.size(); ++k) {
+      const auto& [a, b] = parts.allowed_contacts[k];
+      for (const std::string& name : {a, b})
+        if (index(name) == robot.chain.n())
+          note({{"robot.allowed_contact[" + std::to_string(k) + "].link",
+                 "= \"" + name + "\": no such moving link, nor \"base\""}});
+      allowed.emplace_back(std::min(index(a), index(b)), std::max(index(a), index(b)));
+    }
+    if (!parts.self_collision.value_or(!rbd::is_planar(robot.chain))) return;
+    robot.self_links = scene::self_links(robot, allowed).watched;
+  }
+
   /// Puts the robot to the rest and checks the rules.  Without a robot a stand-in takes its place, so that
   /// the rules that do not ask for its joints are still checked.
   Checked<scene::Scene> assemble(SceneParts parts, const std::string& file_text) {
     std::optional<scene::Robot> robot = read_robot(parts);
     const bool real = robot.has_value();
     if (!real) robot = stand_in();
+    if (real) watch_links(parts, *robot);
     const Eigen::VectorXd q0 = start(parts.q0, robot->chain);
     const Eigen::VectorXd qd0 = parts.qd0.value_or(Eigen::VectorXd::Zero(robot->chain.n()));
     scene::Scene s{parts.name,

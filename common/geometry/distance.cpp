@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/geometry/convex.h"
 #include "common/geometry/segment.h"
 
 namespace hamel::geometry {
@@ -13,11 +14,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kTouching_m = 1e-9;  // below it a direction is not determined
-
-Vector3d unit_or_zero(const Vector3d& v) {
-  const double length = v.norm();
-  return length > 1e-12 ? Vector3d(v / length) : Vector3d::Zero();
-}
 
 // Witnesses from axis point, normal and signed distance of the axis point to the obstacle.
 void finish(const Capsule& link, double axis_distance_m, Closest& c) {

@@ -2,7 +2,7 @@
 /// Closest points between a link and an obstacle: signed distance, witnesses, normal, and how the obstacle
 /// bends there.
 ///
-/// A link is the capsule around its shape.  The signed distance is
+/// Here a link is a capsule; solid.h has the other shapes.  The signed distance is
 ///   d = min over the points x of the capsule's axis of (signed distance of x to the obstacle) - radius,
 /// the exact separation where d >= 0, and minus the depth of the deepest axis point (plus radius) where it is
 /// not. Exact in finitely many operations against spheres, capsules, boxes and half-spaces; against cylinders
@@ -46,6 +46,8 @@ struct Closest {
   Eigen::Vector3d link_axis = Eigen::Vector3d::Zero();  ///< unit; zero for a point
   Eigen::Vector3d obstacle_axis =
       Eigen::Vector3d::Zero();  ///< unit, where the obstacle is straight; else zero
+  /// Second directions, unit, where the link or the obstacle is flat: a face; else zero.
+  Eigen::Vector3d link_axis2 = Eigen::Vector3d::Zero(), obstacle_axis2 = Eigen::Vector3d::Zero();
   double centre_m =
       std::numeric_limits<double>::infinity();  ///< from x_a to the centre of curvature; inf: flat
 };

@@ -180,6 +180,16 @@ const char* to_string(PairPolicy v) {
   return "?";
 }
 
+const char* to_string(Unreachable v) {
+  switch (v) {
+    case Unreachable::reject:
+      return "reject";
+    case Unreachable::approach:
+      return "approach";
+  }
+  return "?";
+}
+
 const char* to_string(Pace v) {
   switch (v) {
     case Pace::lockstep:

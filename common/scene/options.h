@@ -42,6 +42,7 @@ enum class Method : std::uint8_t { attract, khatib, gyro_paper, gyro };
 enum class GainForm : std::uint8_t { F1, F2, F3, S };  ///< readings of Eq. (20); S: scaled with speed
 enum class Mapping : std::uint8_t { paper, force, symmetric };  ///< Eq. (21) verbatim; J^T f; powerless
 enum class PairPolicy : std::uint8_t { nearest, all };
+enum class Unreachable : std::uint8_t { reject, approach };
 
 /// How the arm is steered.  Defaults are for a planar arm of unit links; scenes say their own.
 struct PlannerOptions {
@@ -80,7 +81,9 @@ struct PlannerOptions {
   double stale_state_s = 0.05;         ///< arm state older than this: brake and UNSAFE, > 0
   double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
   double assumed_speed_mps =
-      0;                ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
+      0;  ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
+  /// A target that no configuration meets: STUCK at once and no motion, or as near as can be and then STUCK.
+  Unreachable unreachable = Unreachable::reject;
   double ramp_s = 0.2;  ///< after a restart without memory the command ramps in over it, >= 0
 };
 
@@ -101,6 +104,7 @@ const char* to_string(Method v);
 const char* to_string(GainForm v);
 const char* to_string(Mapping v);
 const char* to_string(PairPolicy v);
+const char* to_string(Unreachable v);
 const char* to_string(Pace v);
 const char* to_string(StopRule v);
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/geometry/shape.h"
@@ -32,6 +33,8 @@ struct Robot {
   std::vector<std::string> warnings =
       {};                    ///< what was read otherwise than written, e.g. "link hand: mesh left out"
   std::string spheres = {};  ///< text of the sidecar with collision spheres; empty: none
+  /// Links that must not touch each other, nearer to the base first (-1: the base); see self_links().
+  std::vector<std::pair<int, int>> self_links = {};
 };
 
 enum class GoalKind : std::uint8_t { position, pose, joints };

@@ -50,6 +50,7 @@ double ObstacleView::at(double t_s, std::vector<geometry::Obstacle>& out, wire::
   out.clear();
   double oldest = 0;
   bool any = false;
+  set_ = 1469598103934665603ull;  // FNV-1a
   for (auto& [source, q] : sources_) {
     while (q.size() > 1 && q[1].t_s <= t_s) q.pop_front();
     if (!current(q)) continue;
@@ -57,6 +58,9 @@ double ObstacleView::at(double t_s, std::vector<geometry::Obstacle>& out, wire::
     const wire::ObstacleSet& s = q.front();
     out.insert(out.end(), s.obstacles.begin(), s.obstacles.end());
     causes.add(wire::ServiceKind::perception, s.sequence_number);
+    for (const std::uint64_t part :
+         {std::uint64_t{source}, std::uint64_t{s.incarnation}, std::uint64_t{s.sequence_number}})
+      set_ = (set_ ^ part) * 1099511628211ull;
     if (std::isfinite(s.next_t_s)) oldest = std::max(oldest, t_s - s.t_s);
   }
   return any ? oldest : std::numeric_limits<double>::infinity();

@@ -30,11 +30,15 @@ class ObstacleView {
   /// the oldest of them [s], 0 for sets that promised no successor, +inf where there is none.
   double at(double t_s, std::vector<geometry::Obstacle>& out, wire::Causes& causes);
 
+  /// A number that changes with what at() last put together but its age; never 0 behind it.
+  std::uint64_t set() const { return set_; }
+
  private:
   using Queue = std::deque<wire::ObstacleSet>;  // ordered by time, of one incarnation
   bool current(const Queue& q) const { return !q.empty() && q.front().incarnation == incarnation_; }
   std::uint64_t incarnation_ = 0;
   std::map<std::uint32_t, Queue> sources_;
+  std::uint64_t set_ = 0;
 };
 
 }  // namespace hamel::planner

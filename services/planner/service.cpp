@@ -198,6 +198,7 @@ void PlannerService::plan(Time now) {
                  .qd = qd_,
                  .obstacles = obstacles_,
                  .obstacle_age_s = obstacle_age_s_,
+                 .obstacle_set = view_.set(),
                  .state_age_s = std::chrono::duration<double>(now - last_state_).count(),
                  .obstacles_expected = true};
   planner_.plan(in, output_);

@@ -58,14 +58,18 @@ TEST(LeastNorm, KnowsAContradiction) {
 
 // hdd from a chain's own motion: Jacobian, bias and curvature against differences of the distance in time,
 // with every joint velocity constant (qdd = 0) and the obstacle flying and turning.
-class ForObstacle : public testing::TestWithParam<geometry::Shape> {};
+/// What the link is, and what it passes.
+struct Passing {
+  geometry::Shape link, obstacle;
+};
+class ForObstacle : public testing::TestWithParam<Passing> {};
 
 TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
   test::Random rng(2);
   int compared = 0;
   for (int k = 0; k < 400; ++k) {
     scene::Robot robot{"r", "", test::random_chain(rng, 4), {}};
-    robot.shapes.push_back(test::link_capsule(3, rng.vec3(0.4), rng.vec3(0.4), 0.05));
+    robot.shapes.push_back({3, GetParam().link, rng.pose(0.4)});
     scene::PlannerOptions options;
     options.rho0_m = 1e3;
     Arm arm(robot.chain);
@@ -73,7 +77,7 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
     Pairs pairs(robot, options);
     const VectorXd q = rng.vector(4, 3), qd = rng.vector(4, 1);
     geometry::Obstacle o;
-    o.shape = GetParam();
+    o.shape = GetParam().obstacle;
     o.X_WO = rng.pose(1);
     o.V_WO << rng.vec3(1), rng.vec3(1);
     const auto distance = [&](double t) {
@@ -90,6 +94,8 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
     const geometry::Closest before = distance(-h), after = distance(h), now = distance(0);
     const bool same_feature = before.slides_on_link == after.slides_on_link && now.distance_m > 0.05 &&
                               before.obstacle_axis.isZero() == after.obstacle_axis.isZero() &&
+                              before.link_axis2.isZero() == after.link_axis2.isZero() &&
+                              before.link_axis.isZero() == after.link_axis.isZero() &&
                               std::isfinite(before.centre_m) == std::isfinite(after.centre_m);
     if (!same_feature) continue;
     pairs.complete(arm);
@@ -110,9 +116,14 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
   EXPECT_GT(compared, 100);
 }
 
-INSTANTIATE_TEST_SUITE_P(Obstacles, ForObstacle,
-                         testing::Values(geometry::Shape{geometry::ShapeKind::sphere, {0.1, 0, 0}},
-                                         geometry::Shape{geometry::ShapeKind::capsule, {0.1, 0.8, 0}}));
+using geometry::ShapeKind;
+constexpr double kRadius = 0.1;
+INSTANTIATE_TEST_SUITE_P(
+    Obstacles, ForObstacle,
+    testing::Values(Passing{{ShapeKind::capsule, {0.05, 0.6, 0}}, {ShapeKind::sphere, {kRadius, 0, 0}}},
+                    Passing{{ShapeKind::capsule, {0.05, 0.6, 0}}, {ShapeKind::capsule, {kRadius, 0.8, 0}}},
+                    Passing{{ShapeKind::box, {0.3, 0.4, 0.6}}, {ShapeKind::sphere, {kRadius, 0, 0}}},
+                    Passing{{ShapeKind::box, {0.3, 0.4, 0.6}}, {ShapeKind::capsule, {kRadius, 0.8, 0}}}));
 
 }  // namespace
 }  // namespace hamel::planner

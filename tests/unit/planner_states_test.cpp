@@ -198,16 +198,19 @@ TEST(States, BlockedGoalIsNamed) {
 
 TEST(States, JointLimitIsNamed) {
   Bench b;
+  b.robot = planar_arm(1, 1.0 / 12, 0.05);
   model::ChainSpec spec = b.robot.chain.spec();
-  for (model::Joint& j : spec.joints) j.limits.upper = 0.6, j.limits.lower = -0.6;
+  spec.joints[0].limits.upper = 2.6, spec.joints[0].limits.lower = -2.6;
   b.robot.chain = checked(spec);
-  b.options.limit_weight = 100;
-  b.q.setZero();
+  b.q = Eigen::VectorXd::Constant(1, 2.5);
+  b.qd = Eigen::VectorXd::Zero(1);
+  b.goal.X_WG.p = {std::cos(2.5), -std::sin(2.5), 0};  // the short way leads over the limit
   b.obstacles.clear();
   const RunResult r = b.go(10);
   EXPECT_EQ(r.last.state, State::stuck);
   EXPECT_EQ(r.last.reason, Reason::joint_limit);
-  EXPECT_LT(r.q.lpNorm<Eigen::Infinity>(), 0.6 + 1e-3);  // the barrier holds the limits
+  EXPECT_LT(r.q[0], 2.6 + 1e-3);  // the barrier holds the limit
+  EXPECT_GT(r.q[0], 2.5);
 }
 
 TEST(States, NewGoalAfterReachedMovesOn) {

@@ -22,13 +22,20 @@ constexpr double kLimitHorizon = 0.5;  // joint rows begin so far from a limit [
 
 double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept {
   const geometry::Closest& c = pair.at;
-  if (!std::isfinite(c.centre_m)) return 0;
   const geometry::Obstacle& o = pair.item->now;
-  const double D = std::max(c.centre_m, kNearest_m);
-  const Vector3d v_axis = pair.v - omega_link.cross(c.on_link - c.on_axis);
   const Vector3d omega_o = o.V_WO.head<3>();
-  const Vector3d v_centre = o.V_WO.tail<3>() + omega_o.cross(c.on_axis + c.centre_m * pair.n - o.X_WO.p);
+  const bool flat = !std::isfinite(c.centre_m);  // the obstacle's face
+  if (flat && omega_o.isZero(0)) return 0;
+  const double apart = flat ? (c.on_obstacle - c.on_axis).norm() : c.centre_m;
+  const double D = std::max(apart, kNearest_m);
+  const Vector3d v_axis = pair.v - omega_link.cross(c.on_link - c.on_axis);
+  const Vector3d v_centre = o.V_WO.tail<3>() + omega_o.cross(c.on_axis + apart * pair.n - o.X_WO.p);
   const Vector3d w = v_centre - v_axis;
+  // A face that turns: d = n.(y - x) with a normal of the link's or of the obstacle's own.
+  if (flat || !c.link_axis2.isZero() || !c.obstacle_axis2.isZero()) {
+    const Vector3d turn = (c.link_axis2.isZero() ? omega_o : omega_link).cross(pair.n);
+    return 2 * turn.dot(w) - D * turn.squaredNorm();
+  }
   const double along = pair.n.dot(w);
   const double F_tautau = (w.squaredNorm() - along * along) / D;
   const bool slides_there = !c.obstacle_axis.isZero();
@@ -44,13 +51,13 @@ double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept
 }
 
 Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options)
-    : options_(options), least_norm_(arm.n(), static_cast<Eigen::Index>(kMaxPairs) + 4 * arm.n()) {
-  const Eigen::Index most = static_cast<Eigen::Index>(kMaxPairs) + 4 * arm.n();
+    : options_(options), least_norm_(arm.n(), static_cast<Eigen::Index>(Pairs::kMost) + 4 * arm.n()) {
+  const Eigen::Index most = static_cast<Eigen::Index>(Pairs::kMost) + 4 * arm.n();
   A_ = Eigen::MatrixXd::Zero(arm.n(), most + 1);  // one spare: a row is written before it is judged
   C_ = A_;
   b_ = s_ = length_ = VectorXd::Zero(most + 1);
   x_ = VectorXd::Zero(arm.n());
-  pair_of_row_.reserve(kMaxPairs);
+  pair_of_row_.reserve(Pairs::kMost);
 }
 
 // A_.col(rows_) is filled; finishes the row unless nothing can act on it.
@@ -68,7 +75,7 @@ void Barrier::add_row(const Arm& arm, double b, double least_mobility) noexcept 
 
 void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
   const double g = options_.barrier_gain;
-  const auto items = pairs.items();
+  const auto items = pairs.guarded();
   pair_of_row_.clear();
   const auto J_tip = arm.J_E.bottomRows<3>();
   const double least = kImmovable * J_tip.cwiseProduct(J_tip.lazyProduct(arm.M_inverse)).sum();
@@ -76,7 +83,7 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
     Pair& pair = items[k];
     pair.multiplier = 0;
     const Vector3d omega = arm.angular_velocity(pair.link);
-    const Vector3d bias = rbd::point_bias_acceleration(arm.chain, arm.ws, pair.link, pair.at.on_axis, arm.qd);
+    const Vector3d bias = pairs.bias(arm, pair);
     const double h = pair.d - options_.dmin_m, hd = -pair.n.dot(pair.v_relative);
     const double curvature = std::min(distance_curvature(pair, omega), 0.0);
     A_.col(rows_).noalias() = -pairs.J(k).transpose().lazyProduct(pair.n);
@@ -124,7 +131,7 @@ Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, VectorXd& a) noexc
   a += x_;
   for (std::size_t r = 0; r < pair_of_row_.size(); ++r) {
     const auto row = static_cast<Eigen::Index>(r);  // pairs come first
-    pairs.items()[pair_of_row_[r]].multiplier = least_norm_.multipliers()[row] / length_[row];
+    pairs.guarded()[pair_of_row_[r]].multiplier = least_norm_.multipliers()[row] / length_[row];
   }
   return outcome;
 }

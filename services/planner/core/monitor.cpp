@@ -54,7 +54,7 @@ Verdict judge(const scene::PlannerOptions& o, Memory& m, const Progress& now) no
   }
 
   if (now.out_of_reach)
-    return {State::stuck, Reason::unreachable, "the target is farther away than the arm is long"};
+    return {State::stuck, Reason::unreachable, "no configuration of the arm meets the target"};
   const bool progress = now.scaled_error < kProgress * m.best_error;
   if (progress || (within && slow)) restart_clocks(m, now);
   const double idle_s = now.t_s - m.progress_s;

@@ -13,6 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kFastest_mps = 10;  // an obstacle of unknown velocity, for what may come into reach
+
 bool usable(const geometry::Obstacle& o) {
   const bool finite = o.X_WO.p.allFinite() && o.X_WO.R.allFinite() && o.shape.dims_m.allFinite() &&
                       (!o.velocity_known || o.V_WO.allFinite()) && std::isfinite(o.sigma_m);
@@ -28,72 +30,129 @@ void move(geometry::Obstacle& o, double age_s) {
 
 }  // namespace
 
-Obstacles::Obstacles() { items_.reserve(kMost); }
+Workspace workspace(const scene::Robot& robot) {
+  const model::Chain& chain = robot.chain;
+  Workspace out{chain.X_WB0() * chain.joint(0).X_PJ.p, 0};
+  double reach = 0;  // of a link's frame
+  for (int i = 0; i < chain.n(); ++i) {
+    const model::Joint& joint = chain.joint(i);
+    if (i > 0) reach += joint.X_PJ.p.norm();
+    if (joint.kind == model::JointKind::prismatic)
+      reach += std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
+    out.radius_m = std::max(out.radius_m, reach);
+    for (const scene::LinkShape& s : robot.shapes)
+      if (s.link == i)
+        out.radius_m = std::max(out.radius_m, reach + s.X_LS.p.norm() + geometry::solid(s.shape, {}).bound_m);
+  }
+  return out;
+}
 
-void Obstacles::take(std::span<const geometry::Obstacle> stamped, double age_s,
-                     const scene::PlannerOptions& o) noexcept {
-  items_.clear();
+Obstacles::Obstacles(const Workspace& workspace) : workspace_(workspace) {
+  items_.reserve(kMost);
+  near_.reserve(kMost);
+}
+
+bool Obstacles::in_reach(const geometry::Obstacle& o, const scene::PlannerOptions& options) const noexcept {
+  geometry::Solid sphere;  // the workspace
+  sphere.X.p = workspace_.centre_W;
+  sphere.bound_m = workspace_.radius_m;
+  const double distance = geometry::distance_bound(sphere, geometry::solid(o.shape, o.X_WO));
+  const double speed = o.velocity_known ? o.V_WO.tail<3>().norm() : kFastest_mps;
+  const double room = std::max(options.rho0_m, kSeen_m) + 2 * std::max(o.sigma_m, 0.0);
+  return !(distance > room + speed * options.stale_brake_s);
+}
+
+// Which of a new set matter, in order of their ids.
+void Obstacles::sift(std::span<const geometry::Obstacle> stamped, const scene::PlannerOptions& o) noexcept {
+  near_.clear();
   all_finite_ = true;
   too_many_ = stamped.size() > kMost;
-  const double age = std::isfinite(age_s) ? std::max(age_s, 0.0) : 0.0;
-  for (const geometry::Obstacle& s : stamped.first(std::min(stamped.size(), kMost))) {
-    if (!usable(s)) {
+  const std::size_t count = std::min(stamped.size(), kMost);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!usable(stamped[k]))
       all_finite_ = false;
-      continue;
-    }
-    Item item{s, 2 * std::max(s.sigma_m, 0.0), items_.size()};
+    else if (in_reach(stamped[k], o))
+      near_.push_back(k);
+  }
+  const auto before = [&](std::size_t a, std::size_t b) {
+    return std::tie(stamped[a].id, a) < std::tie(stamped[b].id, b);
+  };
+  if (!std::is_sorted(near_.begin(), near_.end(), before)) std::sort(near_.begin(), near_.end(), before);
+}
+
+void Obstacles::take(std::span<const geometry::Obstacle> stamped, double age_s,
+                     const scene::PlannerOptions& o, std::uint64_t set) noexcept {
+  const bool known = set != 0 && set == set_ && stamped.size() == set_size_;
+  if (!known) sift(stamped, o);
+  set_ = set;
+  set_size_ = stamped.size();
+  items_.clear();
+  const double age = std::isfinite(age_s) ? std::max(age_s, 0.0) : 0.0;
+  for (const std::size_t k : near_) {
+    const geometry::Obstacle& s = stamped[k];
+    Item item{s, {}, 2 * std::max(s.sigma_m, 0.0), k};
     if (!s.velocity_known) {
       item.now.V_WO.setZero();
       item.inflation_m += o.assumed_speed_mps * age;
     }
     move(item.now, age);
+    item.solid = geometry::solid(item.now.shape, item.now.X_WO);
     items_.push_back(item);
   }
-  const auto before = [](const Item& a, const Item& b) {
-    return std::tie(a.now.id, a.order) < std::tie(b.now.id, b.order);
-  };
-  if (!std::is_sorted(items_.begin(), items_.end(), before)) std::sort(items_.begin(), items_.end(), before);
 }
 
 Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
     : options_(options),
-      pairs_(kMaxPairs),
+      pairs_(kMost),
       nearest_(static_cast<std::size_t>(robot.chain.n())),
       n_(robot.chain.n()),
-      J_(Eigen::MatrixXd::Zero(3, n_ * static_cast<Eigen::Index>(kMaxPairs))),
-      MJ_(Eigen::MatrixXd::Zero(n_, 3)) {
+      J_(Eigen::MatrixXd::Zero(3, n_ * static_cast<Eigen::Index>(kMost))),
+      MJ_(Eigen::MatrixXd::Zero(n_, 3)),
+      J_other_(Eigen::MatrixXd::Zero(3, n_)) {
   for (const scene::LinkShape& s : robot.shapes) {
-    if (s.link < 0 || s.link >= robot.chain.n()) continue;  // the base does not move: nothing to steer
-    bodies_.push_back({0, s.link, s.X_LS * geometry::enclosing_capsule(s.shape)});
-    if (s.link == robot.chain.n() - 1) tip_radius_m_ = bodies_.back().capsule_B.radius_m;
+    if (s.link < -1 || s.link >= robot.chain.n()) continue;
+    bodies_.push_back({0, s.link, geometry::solid(s.shape, s.X_LS), {}});
+    if (s.link == robot.chain.n() - 1) tip_radius_m_ = geometry::enclosing_capsule(s.shape).radius_m;
   }
   std::stable_sort(bodies_.begin(), bodies_.end(),
                    [](const Body& a, const Body& b) { return a.link < b.link; });
-  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].index = static_cast<int>(i);
+  for (Body& b : bodies_)
+    if (b.link >= 0) b.index = shapes_++;
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    for (std::size_t a = 0; a < b; ++a) {
+      const std::pair links{bodies_[a].link, bodies_[b].link};
+      if (std::count(robot.self_links.begin(), robot.self_links.end(), links) > 0) own_.push_back({a, b});
+    }
+  links_.resize(bodies_.size());
+  for (std::size_t k = 0; k < bodies_.size(); ++k) links_[k].now.shape = bodies_[k].solid_B.shape;
 }
 
 void Pairs::clear() noexcept {
-  count_ = 0;
+  count_ = self_count_ = 0;
   dropped_ = 0;
-  clearance_m_ = std::numeric_limits<double>::infinity();
+  clearance_m_ = self_clearance_m_ = std::numeric_limits<double>::infinity();
   for (Nearest& n : nearest_) n = Nearest{};
 }
 
-geometry::Capsule Pairs::link_W(const Arm& arm, int shape) const noexcept {
-  const Body& body = bodies_[static_cast<std::size_t>(shape)];
-  return arm.ws.X_WB[static_cast<std::size_t>(body.link)] * body.capsule_B;
+void Pairs::place(const Arm& arm) noexcept {
+  for (Body& b : bodies_)
+    b.solid_W = (b.link < 0 ? arm.chain.X_WB0() : arm.ws.X_WB[static_cast<std::size_t>(b.link)]) * b.solid_B;
 }
 
 void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
   clear();
+  place(arm);
   for (const Body& body : bodies_) {
-    const geometry::Capsule capsule = link_W(arm, body.index);
+    if (body.link < 0) {
+      touch_base(body, obstacles);
+      continue;
+    }
     Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
     for (const Obstacles::Item& item : obstacles.items()) {
-      const double bound = geometry::distance_bound(capsule, item.now.shape, item.now.X_WO);
+      const double bound = geometry::distance_bound(body.solid_W, item.solid);
       if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
       Pair pair;
-      pair.at = geometry::closest(capsule, item.now.shape, item.now.X_WO);
+      pair.at = geometry::closest(body.solid_W, item.solid);
       if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
       pair.d = pair.at.distance_m - item.inflation_m;
       if (!(pair.d <= options_.rho0_m)) continue;
@@ -113,17 +172,66 @@ void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
   const bool only_nearest =
       options_.method != scene::Method::gyro && options_.pairs == scene::PairPolicy::nearest;
   if (only_nearest) keep_nearest_of_each_link();
+  find_self(arm);
+}
+
+// The base does not move: there is nothing to steer, but who runs into it has touched the arm.  What stands
+// touches it by design.
+void Pairs::touch_base(const Body& base, const Obstacles& obstacles) noexcept {
+  for (const Obstacles::Item& item : obstacles.items()) {
+    const bool stands = item.now.velocity_known && item.now.V_WO.isZero(0);
+    if (stands || geometry::distance_bound(base.solid_W, item.solid) > 0) continue;
+    const double d = geometry::closest(base.solid_W, item.solid).distance_m;
+    if (d < 0) clearance_m_ = std::min(clearance_m_, d);
+  }
+}
+
+// Pairs of two links: the one nearer to the base stands for the obstacle, with the twist it has.
+void Pairs::find_self(const Arm& arm) noexcept {
+  const double range = std::min(options_.rho0_m, kSelfRange_m);
+  for (const Own& own : own_) {
+    const Body &a = bodies_[own.a], &b = bodies_[own.b];
+    if (geometry::distance_bound(b.solid_W, a.solid_W) > range) continue;
+    Pair pair;
+    pair.at = geometry::closest(b.solid_W, a.solid_W);
+    pair.d = pair.at.distance_m;
+    self_clearance_m_ = std::min(self_clearance_m_, pair.d);
+    if (!(pair.d <= range)) continue;
+    Obstacles::Item& item = links_[own.a];
+    item.now.X_WO = a.solid_W.X;
+    item.now.V_WO.setZero();
+    if (a.link >= 0) {
+      const auto i = static_cast<std::size_t>(a.link);
+      item.now.V_WO.head<3>() = arm.angular_velocity(a.link);
+      item.now.V_WO.tail<3>() = arm.ws.X_WB[i].R * arm.ws.V_B[i].tail<3>() +
+                                item.now.V_WO.head<3>().cross(a.solid_W.X.p - arm.ws.X_WB[i].p);
+    }
+    pair.shape = b.index;
+    pair.link = b.link;
+    pair.other_link = a.link;
+    pair.item = &item;
+    pair.n = pair.at.normal;
+    std::size_t slot = count_ + self_count_;
+    if (self_count_ == kMaxSelf) {
+      for (std::size_t k = count_; k < count_ + kMaxSelf; ++k)
+        if (slot == count_ + kMaxSelf || pairs_[k].d > pairs_[slot].d) slot = k;
+      if (!(pair.d < pairs_[slot].d)) continue;
+    } else {
+      ++self_count_;
+    }
+    pairs_[slot] = pair;
+  }
 }
 
 // When the table is full the farthest pair makes room.
 void Pairs::offer(const Pair& pair) noexcept {
-  if (count_ < pairs_.size()) {
+  if (count_ < kMaxPairs) {
     pairs_[count_++] = pair;
     return;
   }
   ++dropped_;
-  auto farthest =
-      std::max_element(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) { return a.d < b.d; });
+  auto farthest = std::max_element(pairs_.begin(), pairs_.begin() + static_cast<std::ptrdiff_t>(count_),
+                                   [](const Pair& a, const Pair& b) { return a.d < b.d; });
   if (pair.d < farthest->d) *farthest = pair;
 }
 
@@ -140,12 +248,22 @@ void Pairs::keep_nearest_of_each_link() noexcept {
 }
 
 void Pairs::advance(const Arm& arm, double ahead_s) noexcept {
+  place(arm);
+  const auto body = [&](int shape) -> const Body& {
+    return bodies_[bodies_.size() - static_cast<std::size_t>(shapes_ - shape)];
+  };
   for (Pair& pair : items()) {
     lie::Pose X_WO = pair.item->now.X_WO;
     X_WO.p += ahead_s * pair.item->now.V_WO.tail<3>();
-    pair.at = geometry::closest(link_W(arm, pair.shape), pair.item->now.shape, X_WO);
+    pair.at = geometry::closest(body(pair.shape).solid_W, geometry::solid(pair.item->now.shape, X_WO));
     pair.d = pair.at.distance_m - pair.item->inflation_m;
     pair.n = pair.at.normal;
+  }
+  if (!own_.empty()) {
+    const double clearance = self_clearance_m_;
+    self_count_ = 0;
+    find_self(arm);
+    self_clearance_m_ = clearance;  // of now
   }
 }
 
@@ -162,6 +280,30 @@ void Pairs::complete(const Arm& arm) noexcept {
     const Eigen::Matrix3d B = J_k.lazyProduct(MJ_);
     pair.Lam = operational_inertia(options_, B);
   }
+  for (std::size_t k = count_; k < count_ + self_count_; ++k) complete_self(arm, k);
+}
+
+void Pairs::complete_self(const Arm& arm, std::size_t k) noexcept {
+  Pair& pair = pairs_[k];
+  auto J_k = J(k);
+  rbd::point_jacobian(arm.chain, arm.ws, pair.link, pair.at.on_link, J_k);
+  pair.v.noalias() = J_k * arm.qd;
+  pair.v_obstacle.setZero();
+  if (pair.other_link >= 0) {
+    rbd::point_jacobian(arm.chain, arm.ws, pair.other_link, pair.at.on_obstacle, J_other_);
+    pair.v_obstacle.noalias() = J_other_ * arm.qd;
+    J_k -= J_other_;
+  }
+  pair.v_relative = pair.v - pair.v_obstacle;
+}
+
+Vector3d Pairs::bias(const Arm& arm, const Pair& pair) const noexcept {
+  Vector3d a = rbd::point_bias_acceleration(arm.chain, arm.ws, pair.link, pair.at.on_axis, arm.qd);
+  const bool flat = !std::isfinite(pair.at.centre_m);
+  const Vector3d there = flat ? pair.at.on_obstacle : Vector3d(pair.at.on_axis + pair.at.centre_m * pair.n);
+  if (pair.other_link >= 0)
+    a -= rbd::point_bias_acceleration(arm.chain, arm.ws, pair.other_link, there, arm.qd);
+  return a;
 }
 
 }  // namespace hamel::planner

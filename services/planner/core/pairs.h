@@ -7,42 +7,62 @@
 #include <span>
 #include <vector>
 
-#include "common/geometry/distance.h"
 #include "common/geometry/shape.h"
+#include "common/geometry/solid.h"
 #include "common/scene/scene.h"
 #include "services/planner/core/arm.h"
 #include "services/planner/core/memory.h"
 
 namespace hamel::planner {
 
+inline constexpr int kNoLink = -2;
+
+/// Where the arm can be at all: nothing of it is farther than radius_m from centre_W.
+struct Workspace {
+  Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
+  double radius_m = 0;
+};
+Workspace workspace(const scene::Robot& robot);
+
 /// The obstacles of this cycle: extrapolated to now, in order of their ids (then of the input), only finite
-/// ones.
+/// ones, and only those that come within kSeen_m (or rho0) of the workspace while their set holds.
 class Obstacles {
  public:
   static constexpr std::size_t kMost = 4096;
-  Obstacles();
+  static constexpr double kSeen_m = 0.5;
+  explicit Obstacles(const Workspace& workspace = {{}, scene::kInf});
   /// Takes a set `age_s` old.  A moving obstacle goes on with its twist; one of unknown velocity stays and
-  /// grows.
-  void take(std::span<const geometry::Obstacle> stamped, double age_s,
-            const scene::PlannerOptions& o) noexcept;
+  /// grows.  @param set  a number that changes with the set; while it stays (not 0), obstacles that were out
+  /// of reach are not looked at again
+  void take(std::span<const geometry::Obstacle> stamped, double age_s, const scene::PlannerOptions& o,
+            std::uint64_t set = 0) noexcept;
 
   struct Item {
     geometry::Obstacle now;
-    double inflation_m = 0;  ///< 2 sigma + assumed speed times age
-    std::size_t order = 0;   ///< in the input
+    geometry::Solid solid{};  ///< the same, for distances
+    double inflation_m = 0;   ///< 2 sigma + assumed speed times age
+    std::size_t order = 0;    ///< in the input
   };
   std::span<const Item> items() const noexcept { return items_; }
   bool all_finite() const noexcept { return all_finite_; }
   bool too_many() const noexcept { return too_many_; }
 
  private:
+  bool in_reach(const geometry::Obstacle& o, const scene::PlannerOptions& options) const noexcept;
+  void sift(std::span<const geometry::Obstacle> stamped, const scene::PlannerOptions& o) noexcept;
+
+  Workspace workspace_;
   std::vector<Item> items_;
+  std::vector<std::size_t> near_;  ///< of the set, in order of ids
+  std::uint64_t set_ = 0;
+  std::size_t set_size_ = 0;
   bool all_finite_ = true, too_many_ = false;
 };
 
-/// A link shape and an obstacle within reach of its influence; world frame.
+/// A link shape and an obstacle, or another link, within reach of its influence; world frame.
 struct Pair {
   int shape = 0, link = 0;     ///< shapes are counted from base to tip
+  int other_link = kNoLink;    ///< pairs of two links: the one that stands for the obstacle; -1: the base
   std::uint32_t obstacle = 0;  ///< id
   const Obstacles::Item* item = nullptr;
   geometry::Closest at;
@@ -58,9 +78,13 @@ struct Pair {
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();       ///< turning axis used
 };
 
-/// Pairs in range in the order (link, shape, obstacle id), and each link's nearest obstacle.
+/// Pairs in range in the order (link, shape, obstacle id), and each link's nearest obstacle.  Behind them the
+/// pairs of two links that are near each other.
 class Pairs {
  public:
+  static constexpr std::size_t kMaxSelf = 64;  ///< the nearest of the pairs of links in range
+  static constexpr std::size_t kMost = kMaxPairs + kMaxSelf;
+  static constexpr double kSelfRange_m = 0.1;  ///< pairs of links begin to count here (or at rho0)
   Pairs(const scene::Robot& robot, const scene::PlannerOptions& options);
 
   void clear() noexcept;
@@ -73,7 +97,12 @@ class Pairs {
 
   std::span<Pair> items() noexcept { return {pairs_.data(), count_}; }
   std::span<const Pair> items() const noexcept { return {pairs_.data(), count_}; }
-  /// J (3 x n) at the witness point of pair k.
+  /// What the barrier keeps apart: items(), then the pairs of two links.
+  std::span<Pair> guarded() noexcept { return {pairs_.data(), count_ + self_count_}; }
+  std::span<const Pair> guarded() const noexcept { return {pairs_.data(), count_ + self_count_}; }
+  /// Acceleration at qdd = 0 of a pair's point on the link, less that of the other link's point.
+  Eigen::Vector3d bias(const Arm& arm, const Pair& pair) const noexcept;
+  /// J (3 x n) at the witness point of pair k of guarded(); of two links: of one against the other.
   auto J(std::size_t k) noexcept { return J_.middleCols(static_cast<Eigen::Index>(k) * n_, n_); }
   auto J(std::size_t k) const noexcept { return J_.middleCols(static_cast<Eigen::Index>(k) * n_, n_); }
 
@@ -85,28 +114,39 @@ class Pairs {
   };
   std::span<const Nearest> nearest() const noexcept { return nearest_; }
   double clearance_m() const noexcept { return clearance_m_; }
+  /// Smallest distance of two links that must not touch; +inf where none are within range.
+  double self_clearance_m() const noexcept { return self_clearance_m_; }
   int dropped() const noexcept { return dropped_; }
   /// Radius about the end effector that a target must have free [m].
   double tip_radius_m() const noexcept { return tip_radius_m_; }
 
  private:
-  geometry::Capsule link_W(const Arm& arm, int shape) const noexcept;
-  void offer(const Pair& pair) noexcept;
-  void keep_nearest_of_each_link() noexcept;
-
   struct Body {
     int index = 0, link = 0;
-    geometry::Capsule capsule_B;
+    geometry::Solid solid_B, solid_W;
   };
+  /// Two bodies that must not touch; the first is nearer to the base.
+  struct Own {
+    std::size_t a = 0, b = 0;
+  };
+  void place(const Arm& arm) noexcept;
+  void touch_base(const Body& base, const Obstacles& obstacles) noexcept;
+  void find_self(const Arm& arm) noexcept;
+  void offer(const Pair& pair) noexcept;
+  void complete_self(const Arm& arm, std::size_t k) noexcept;
+  void keep_nearest_of_each_link() noexcept;
+
   const scene::PlannerOptions& options_;
   std::vector<Body> bodies_;
+  std::vector<Own> own_;
+  std::vector<Obstacles::Item> links_;  ///< each body as an obstacle to the others
   std::vector<Pair> pairs_;
-  std::size_t count_ = 0;
+  std::size_t count_ = 0, self_count_ = 0;
   std::vector<Nearest> nearest_;
   Eigen::Index n_ = 0;
-  Eigen::MatrixXd J_, MJ_;  ///< all Jacobians side by side; M^-1 J^T of one
-  double clearance_m_ = 0, tip_radius_m_ = 0;
-  int dropped_ = 0;
+  Eigen::MatrixXd J_, MJ_, J_other_;  ///< all Jacobians side by side; M^-1 J^T of one; the other link's
+  double clearance_m_ = 0, self_clearance_m_ = 0, tip_radius_m_ = 0;
+  int dropped_ = 0, shapes_ = 0;  ///< shapes_: bodies that are not the base's
 };
 
 }  // namespace hamel::planner

@@ -13,6 +13,7 @@
 #include "services/planner/core/holds.h"
 #include "services/planner/core/monitor.h"
 #include "services/planner/core/pairs.h"
+#include "services/planner/core/reachable.h"
 
 namespace hamel::planner {
 
@@ -35,6 +36,7 @@ struct Planner::Impl {
         attraction(arm, options),
         gyro(arm, options),
         barrier(arm, options),
+        obstacles(workspace(robot)),
         pairs(robot, options),
         tau_att(VectorXd::Zero(arm.n())),
         qdd_att(tau_att),
@@ -55,6 +57,11 @@ struct Planner::Impl {
   void report(const Verdict& verdict, Report& out) noexcept;
   void report_links(Report& out) const noexcept;
   double slow_down(const Input& in) const noexcept;
+  void look_for_a_way(const scene::Goal& wanted);
+  Verdict approached(Verdict verdict) noexcept;
+  bool approaching() const noexcept {
+    return !goal_reachable && options.unreachable == scene::Unreachable::approach;
+  }
   bool target_blocked() const noexcept;
   void remember_tip() noexcept;
 
@@ -68,8 +75,9 @@ struct Planner::Impl {
   Barrier::Outcome outcome;
   VectorXd tau_att, qdd_att, qdd;
   std::vector<HeldPair> scratch;
-  scene::Goal goal;
-  bool has_goal = false, goal_fits = true;
+  scene::Goal goal, asked;               // `asked` as it came
+  Vector3d beyond_W = Vector3d::Zero();  // from where the arm is sent to a target out of reach
+  bool has_goal = false, goal_fits = true, goal_reachable = true, looked = false;
   double tip_speed = 0;
   Memory memory;
 };
@@ -94,8 +102,26 @@ void Planner::set_goal(const scene::Goal& goal) {
   p.has_goal = true;
   p.goal_fits = joints ? goal.joints.size() == p.arm.n() && goal.joints.allFinite()
                        : goal.X_WG.p.allFinite() && goal.X_WG.R.allFinite() && goal.V_WG.allFinite();
+  p.look_for_a_way(goal);
   if (goal.id != p.memory.goal_id) p.memory.goal_started = 0;
   p.memory.goal_id = goal.id;
+}
+
+// Whether the arm can meet the goal at all, and where to send it if not.
+void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
+  const bool same = wanted.id == memory.goal_id && wanted.kind == asked.kind &&
+                    wanted.X_WG.p == asked.X_WG.p && wanted.X_WG.R == asked.X_WG.R;
+  if (!goal_fits || wanted.kind == scene::GoalKind::joints) {
+    goal_reachable = true;
+    beyond_W.setZero();
+  } else if (!same || !looked) {
+    const Reach found = reach(arm.chain, wanted, options);
+    goal_reachable = found.reachable;
+    beyond_W = found.reachable ? Vector3d(Vector3d::Zero()) : Vector3d(wanted.X_WG.p - found.nearest_W);
+    looked = true;
+  }
+  asked = wanted;
+  if (!goal_reachable && options.unreachable == scene::Unreachable::approach) goal.X_WG.p -= beyond_W;
 }
 
 void Planner::clear_goal() {
@@ -141,10 +167,11 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
   }
   arm.look(in.q, in.qd);
   remember_tip();
-  obstacles.take(in.obstacles, in.obstacle_age_s, options);
+  obstacles.take(in.obstacles, in.obstacle_age_s, options, in.obstacle_set);
   pairs.find(arm, obstacles);
   memory.clearance_min_m = std::min(memory.clearance_min_m, pairs.clearance_m());
-  const bool contact = pairs.clearance_m() < 0;
+  const bool self_contact = pairs.self_clearance_m() < 0;
+  const bool contact = pairs.clearance_m() < 0 || self_contact;
   memory.contacts += contact;
   prepare(in);
 
@@ -153,9 +180,10 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
     return {State::fault, Reason::configuration, "the command period is not a positive number"};
   if (has_goal && !goal_fits) return {State::fault, Reason::configuration, "the goal does not fit the robot"};
   if (obstacles.too_many()) return {State::fault, Reason::internal, "more obstacles than the planner holds"};
+  if (self_contact) return {State::unsafe, Reason::contact, "two links touch"};
   if (contact) return {State::unsafe, Reason::contact, "a link touches an obstacle"};
-  if (was_contact && pairs.clearance_m() < options.dmin_m)
-    return {State::unsafe, Reason::contact, "a link has touched an obstacle and is still too near"};
+  if (was_contact && std::min(pairs.clearance_m(), pairs.self_clearance_m()) < options.dmin_m)
+    return {State::unsafe, Reason::contact, "a link has touched something and is still too near"};
   if (!obstacles.all_finite()) return {State::unsafe, Reason::non_finite, "an obstacle is not finite"};
   if (!(in.state_age_s <= options.stale_state_s))
     return {State::unsafe, Reason::stale_state, "the arm's state is old"};
@@ -198,18 +226,28 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
     now.speed = joints ? arm.qd.lpNorm<Eigen::Infinity>() : tip_speed;
     now.out_of_reach =
         joints ? attraction.beyond_limits(arm, goal)
-               : (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
+               : (!goal_reachable && !approaching()) ||
+                     (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
     now.target_blocked = !joints && target_blocked();
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
     now.escaping =
         options.method == Method::gyro && options.kc > 0 && memory.turn_count > 0 && memory.flips < kFlips;
     verdict = judge(options, memory, now);
+    if (approaching()) verdict = approached(verdict);
   }
-  steer(in, verdict.reason == Reason::unreachable, tau);
+  steer(in, verdict.reason == Reason::unreachable && !approaching(), tau);
   if (options.method == Method::gyro && guard(tau)) {
     memory.infeasible_s = in.t_s;
     return {State::unsafe, Reason::infeasible, "no acceleration keeps all distances: braking"};
   }
+  return verdict;
+}
+
+// The place nearest to a target out of reach is no goal: who is there is stuck.
+Verdict Planner::Impl::approached(Verdict verdict) noexcept {
+  if (verdict.state == State::reached) memory.time_to_goal_s = -1;
+  if (verdict.state == State::reached || verdict.state == State::stuck)
+    return {State::stuck, Reason::unreachable, "as near as the arm comes to a target out of reach"};
   return verdict;
 }
 
@@ -295,11 +333,12 @@ double Planner::Impl::slow_down(const Input& in) const noexcept {
 
 bool Planner::Impl::target_blocked() const noexcept {
   const Vector3d& target = attraction.target_W();
-  const geometry::Capsule tip{target, target, pairs.tip_radius_m(), 0};
+  const geometry::Solid tip = geometry::solid({geometry::ShapeKind::sphere, {pairs.tip_radius_m(), 0, 0}},
+                                              {Eigen::Matrix3d::Identity(), target});
   for (const Obstacles::Item& item : obstacles.items()) {
     const double margin = item.inflation_m + (options.barrier_gain > 0 ? options.dmin_m : 0);
-    if (geometry::distance_bound(tip, item.now.shape, item.now.X_WO) > margin) continue;
-    if (geometry::closest(tip, item.now.shape, item.now.X_WO).distance_m < margin) return true;
+    if (geometry::distance_bound(tip, item.solid) > margin) continue;
+    if (geometry::closest(tip, item.solid).distance_m < margin) return true;
   }
   return false;
 }
@@ -319,9 +358,11 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.end_effector_m = vector(memory.tip_m);
   out.goal_id = has_goal ? goal.id : 0;
   const bool joints = goal.kind == scene::GoalKind::joints;
-  out.target_error_m = !has_goal ? 0
-                       : joints  ? attraction.error().position_m
-                                 : (attraction.target_W() - out.end_effector_m).norm();
+  out.target_error_m =
+      !has_goal ? 0
+      : joints  ? attraction.error().position_m
+               : (attraction.target_W() + (approaching() ? beyond_W : Vector3d(0, 0, 0)) - out.end_effector_m)
+                     .norm();
   out.orientation_error_rad = has_goal ? attraction.error().angle_rad : 0;
   out.clearance_m = pairs.clearance_m();
   out.clearance_min_m = memory.clearance_min_m;

@@ -57,6 +57,9 @@ struct Input {
   /// for. +inf: no set ever arrived.  A set that promised no successor (next_t_s = +inf) does not age: pass
   /// 0.
   double obstacle_age_s = 0;
+  /// Changes with every new obstacle set: what is out of reach of a set is then sorted out once and not every
+  /// cycle.  0: not known.  The output is the same either way.
+  std::uint64_t obstacle_set = 0;
   double state_age_s = 0;           ///< how old the arm state is
   bool obstacles_expected = false;  ///< the scene has perception: no motion before its first set
 };
@@ -103,7 +106,7 @@ struct Output {
 /// A planner bound to one robot and one set of options.  Not for two threads at once.
 class Planner {
  public:
-  /// `options` must be valid (scene::problems()).  Link boxes and cylinders become their enclosing capsules.
+  /// `options` must be valid (scene::problems()).  Link shapes are taken as they are.
   Planner(const scene::Robot& robot, const Options& options);
   ~Planner();
   Planner(Planner&&) noexcept;

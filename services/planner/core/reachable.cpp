@@ -1,0 +1,132 @@
+#include "services/planner/core/reachable.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace hamel::planner {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+constexpr int kStarts = 100, kSteps = 80;
+constexpr double kTurn_m = 0.3;  // so much of a place a radian is worth
+
+/// Inverse kinematics of one goal.
+class Search {
+ public:
+  Search(const model::Chain& chain, const scene::Goal& goal)
+      : chain_(chain), goal_(goal), pose_(goal.kind == scene::GoalKind::pose), ws_(chain), J_(6, chain.n()) {
+    low_.resize(chain.n());
+    high_.resize(chain.n());
+    for (int i = 0; i < chain.n(); ++i) {
+      low_[i] = std::max(chain.joint(i).limits.lower, -std::numbers::pi);
+      high_[i] = std::min(chain.joint(i).limits.upper, std::numbers::pi);
+    }
+  }
+
+  // The k-th of a sequence that fills the limits evenly. [Roberts 2018]
+  VectorXd start(int k) const {
+    VectorXd q(chain_.n());
+    double phi = 2, step = 1;
+    for (int it = 0; it < 30; ++it) phi = std::pow(1 + phi, 1.0 / (chain_.n() + 1));
+    for (int i = 0; i < chain_.n(); ++i) {
+      step /= phi;
+      const double u = 0.5 + step * k;
+      q[i] = low_[i] + (u - std::floor(u)) * (high_[i] - low_[i]);
+    }
+    return q;
+  }
+
+  // What is left of the way at q: turned, moved; sets J_.
+  Vector6d error(const VectorXd& q) {
+    rbd::positions(chain_, q, ws_);
+    X_WE_ = rbd::tip(chain_, ws_);
+    rbd::frame_jacobian(chain_, ws_, chain_.n() - 1, X_WE_.p, J_);
+    Vector6d e = Vector6d::Zero();
+    e.tail<3>() = goal_.X_WG.p - X_WE_.p;
+    if (pose_) {
+      const Eigen::AngleAxisd turn(Eigen::Quaterniond(goal_.X_WG.R * X_WE_.R.transpose()).normalized());
+      e.head<3>() = kTurn_m * turn.angle() * turn.axis();
+      J_.topRows<3>() *= kTurn_m;
+    } else {
+      J_.topRows<3>().setZero();
+    }
+    return e;
+  }
+
+  // Levenberg-Marquardt, every step cut at the limits; a joint at its limit that would go on stays out of it.
+  Vector6d descend(VectorXd& q) {
+    Vector6d e = error(q);
+    double damping = 1e-2;
+    for (int k = 0; k < kSteps && e.norm() > 1e-4; ++k) {
+      const VectorXd dq = step(q, e, damping);
+      const VectorXd tried = (q + dq).cwiseMax(low_).cwiseMin(high_);
+      const Vector6d left = error(tried);
+      if (left.norm() < e.norm()) {
+        const bool still = left.norm() > 0.9999 * e.norm();
+        q = tried;
+        e = left;
+        damping = std::max(0.3 * damping, 1e-6);
+        if (still) break;
+      } else {
+        damping *= 5;
+        if (damping > 1e4) break;
+        e = error(q);
+      }
+    }
+    return e;
+  }
+
+ private:
+  VectorXd step(const VectorXd& q, const Vector6d& e, double damping) {
+    VectorXd dq;
+    for (bool again = true; again;) {
+      Eigen::Matrix<double, 6, 6> A = J_ * J_.transpose();
+      A.diagonal().array() += damping;
+      dq = J_.transpose() * A.ldlt().solve(e);
+      again = false;
+      for (int j = 0; j < chain_.n(); ++j) {
+        const bool out = (q[j] >= high_[j] && dq[j] > 0) || (q[j] <= low_[j] && dq[j] < 0);
+        if (out) J_.col(j).setZero(), again = true;
+      }
+    }
+    return dq;
+  }
+
+  const model::Chain& chain_;
+  const scene::Goal& goal_;
+  const bool pose_;
+  rbd::Workspace ws_;
+  Eigen::MatrixXd J_;
+  VectorXd low_, high_;
+  lie::Pose X_WE_;
+};
+
+}  // namespace
+
+Reach reach(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& o) {
+  if (goal.kind == scene::GoalKind::joints) return {};
+  Search search(chain, goal);
+  Reach out{false, Vector3d::Zero()};
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kStarts; ++k) {
+    VectorXd q = search.start(k);
+    const Vector6d e = search.descend(q);
+    if (e.tail<3>().norm() <= 0.5 * o.goal_tolerance_m &&
+        e.head<3>().norm() <= 0.5 * kTurn_m * o.goal_tolerance_rad)
+      return {true, goal.X_WG.p};
+    if (e.norm() < least) {
+      least = e.norm();
+      out.nearest_W = goal.X_WG.p - e.tail<3>();
+    }
+  }
+  return out;
+}
+
+}  // namespace hamel::planner

@@ -1,0 +1,23 @@
+#pragma once
+/// Whether any configuration meets a goal, and how near one can come.
+
+#include "common/scene/options.h"
+#include "common/scene/scene.h"
+#include "services/planner/core/arm.h"
+
+namespace hamel::planner {
+
+struct Reach {
+  bool reachable = true;
+  Eigen::Vector3d nearest_W = Eigen::Vector3d::Zero();  ///< position of the end effector that comes nearest
+};
+
+/// Damped inverse kinematics from 100 configurations within the joint limits, the same ones each time;
+/// obstacles play no part.  Position and pose goals; goals of joints are reachable within their limits.
+///
+/// "Not reachable" is a search that failed, no proof; of 2,000 goals that are reachable by construction none
+/// was refused (a test).  Takes 0.1 ms where it is, some milliseconds where it is not: for new goals, not for
+/// cycles. Allocates.
+Reach reach(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& options);
+
+}  // namespace hamel::planner

@@ -1,0 +1,159 @@
+// Goals: met, refused or approached; links that must not touch; obstacles out of reach.
+#include <gtest/gtest.h>
+
+#include "common/rbd/rbd.h"
+#include "common/scene/self_links.h"
+#include "services/planner/core/reachable.h"
+#include "tests/support/planner_scene.h"
+
+namespace hamel::planner {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+scene::PlannerOptions planar_options() {
+  scene::PlannerOptions o;
+  o.vmax_mps = 1;
+  return o;
+}
+
+model::Chain seven_joints(test::Random& rng) {
+  model::ChainSpec spec = test::random_chain(rng, 7).spec();
+  for (model::Joint& j : spec.joints) j.limits.lower = -2.5, j.limits.upper = 2.5;
+  return model::build(std::move(spec)).value();
+}
+
+TEST(Reach, RefusesNoGoalThatAConfigurationMeets) {
+  test::Random rng(5);
+  int refused = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const model::Chain chain = seven_joints(rng);
+    rbd::Workspace ws(chain);
+    rbd::positions(chain, rng.vector(7, 2.5), ws);
+    scene::Goal goal;
+    goal.kind = k % 2 ? scene::GoalKind::pose : scene::GoalKind::position;
+    goal.X_WG = rbd::tip(chain, ws);
+    refused += !reach(chain, goal, {}).reachable;
+  }
+  EXPECT_EQ(refused, 0);
+}
+
+TEST(Reach, RefusesWhatIsBeyondTheArmAndKnowsTheNearestPlace) {
+  const scene::Robot robot = test::planar_arm(4, 0.1, 0.05);
+  for (double angle = 0; angle < 6; angle += 0.5) {
+    scene::Goal goal;
+    const Vector3d along(std::cos(angle), std::sin(angle), 0);
+    goal.X_WG.p = 5 * along;
+    const Reach found = reach(robot.chain, goal, {});
+    EXPECT_FALSE(found.reachable);
+    EXPECT_NEAR((found.nearest_W - 4 * along).norm(), 0, 1e-2) << angle;
+    goal.X_WG.p = 3.9 * along;
+    EXPECT_TRUE(reach(robot.chain, goal, {}).reachable) << angle;
+  }
+}
+
+test::RunResult run_to(const scene::PlannerOptions& o, const Vector3d& target) {
+  scene::Goal goal;
+  goal.id = 1;
+  goal.X_WG.p = target;
+  return test::run(test::planar_arm(4, 0.1, 0.05), {}, o, goal, Eigen::Vector4d(0.4, 0.8, 0.8, 0.8), 2e-3,
+                   12);
+}
+
+TEST(Goals, OutOfReachIsRefusedAtOnceWithoutMotion) {
+  const test::RunResult r = run_to(planar_options(), {3, 4, 0});
+  EXPECT_EQ(r.last.state, State::stuck);
+  EXPECT_EQ(r.last.reason, Reason::unreachable);
+  EXPECT_LE(r.stuck_at_s, 0.01);
+  EXPECT_LT(r.last.path_length_m, 1e-9);
+}
+
+TEST(Goals, OutOfReachIsApproachedWhenAsked) {
+  scene::PlannerOptions o = planar_options();
+  o.unreachable = scene::Unreachable::approach;
+  const test::RunResult r = run_to(o, {3, 4, 0});
+  EXPECT_EQ(r.last.state, State::stuck);
+  EXPECT_EQ(r.last.reason, Reason::unreachable);
+  EXPECT_EQ(r.reached_at_s, -1);
+  EXPECT_NEAR(r.last.target_error_m, 1, 0.02);
+  EXPECT_NEAR((r.last.end_effector_m - Vector3d(2.4, 3.2, 0)).norm(), 0, 0.02);
+}
+
+TEST(Goals, AMovingTargetIsFollowed) {
+  scene::Goal goal;
+  goal.id = 1;
+  goal.X_WG.p = {2, 1, 0};
+  goal.V_WG.tail<3>() = Vector3d(0.02, 0.03, 0);
+  const test::RunResult r = test::run(test::planar_arm(4, 0.1, 0.05), {}, planar_options(), goal,
+                                      Eigen::Vector4d(0.4, 0.8, 0.8, 0.8), 2e-3, 15);
+  EXPECT_EQ(r.last.state, State::reached);
+  EXPECT_LT(r.last.target_error_m, 0.005);
+  EXPECT_NEAR((r.last.end_effector_m - Vector3d(2.3, 1.45, 0)).norm(), 0, 0.01);
+}
+
+/// Three links of which the third shall go through the first.
+test::RunResult fold(scene::Method method) {
+  scene::Robot robot = test::planar_arm(3, 0.1, 0.05);
+  robot.self_links = {{0, 2}};
+  scene::PlannerOptions o = planar_options();
+  o.method = method;
+  scene::Goal goal;
+  goal.id = 1;
+  goal.kind = scene::GoalKind::joints;
+  goal.joints = Eigen::Vector3d(0, 2.8, 2.8);
+  return test::run(robot, {}, o, goal, Eigen::Vector3d(0, 1, 0.3), 2e-3, 12);
+}
+
+TEST(SelfCollision, BarrierKeepsLinksApart) {
+  const test::RunResult r = fold(scene::Method::gyro);
+  EXPECT_EQ(r.contact_at_s, -1);
+  EXPECT_EQ(r.last.state, State::stuck);
+  EXPECT_GT(r.final_error_m, 0.1);
+}
+
+TEST(SelfCollision, IsReportedUnsafeWhereNothingPreventsIt) {
+  const test::RunResult r = fold(scene::Method::attract);
+  EXPECT_GT(r.contact_at_s, 0);
+  EXPECT_EQ(r.last.state, State::unsafe);
+  EXPECT_EQ(r.last.reason, Reason::contact);
+  EXPECT_STREQ(r.last.detail, "two links touch");
+}
+
+TEST(SelfLinks, LeavesOutNeighboursAllowedOnesAndThoseThatAlwaysTouch) {
+  scene::Robot robot = test::planar_arm(4, 0.1, 0.05);
+  EXPECT_EQ(scene::self_links(robot).watched, (std::vector<std::pair<int, int>>{{0, 2}, {0, 3}, {1, 3}}));
+  EXPECT_EQ(scene::self_links(robot, {{0, 3}}).watched, (std::vector<std::pair<int, int>>{{0, 2}, {1, 3}}));
+  robot.shapes[0].shape.dims_m[0] = 3;  // swallows links 1 and 2
+  const scene::SelfLinks found = scene::self_links(robot);
+  EXPECT_EQ(std::count(found.touching.begin(), found.touching.end(), std::pair{0, 2}), 1);
+}
+
+TEST(Obstacles, OutOfReachChangeNothing) {
+  const scene::Robot robot = test::planar_arm(4, 0.1, 0.05);
+  std::vector<geometry::Obstacle> near, all;
+  test::Random rng(9);
+  for (std::uint32_t k = 0; k < 10; ++k)
+    near.push_back(test::sphere(k, rng.vec3(3) + Vector3d(0, 0, 0), 0.1));
+  all = near;
+  for (std::uint32_t k = 10; k < 1000; ++k)
+    all.push_back(test::sphere(k, Vector3d(10, 0, 0) + rng.vec3(4), 0.1));
+  Planner a(robot, planar_options()), b(robot, planar_options());
+  scene::Goal goal;
+  goal.id = 1;
+  goal.X_WG.p = {1, 2, 0};
+  a.set_goal(goal);
+  b.set_goal(goal);
+  Output x = a.output(), y = b.output();
+  for (int k = 0; k < 20; ++k) {
+    const VectorXd q = rng.vector(4, 1), qd = rng.vector(4, 1);
+    const double t = 1e-3 * k;
+    a.plan({.step = 1, .t_s = t, .q = q, .qd = qd, .obstacles = near}, x);
+    b.plan({.step = 1, .t_s = t, .q = q, .qd = qd, .obstacles = all, .obstacle_set = k < 10 ? 0u : 7u}, y);
+    EXPECT_EQ(x.torque_Nm, y.torque_Nm) << k;
+    EXPECT_EQ(x.report.clearance_m, y.report.clearance_m);
+  }
+}
+
+}  // namespace
+}  // namespace hamel::planner
