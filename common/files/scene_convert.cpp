@@ -140,6 +140,10 @@ void read_planner(const Fields& read, scene::PlannerOptions& o, std::string& bus
   read("stale_state_s", o.stale_state_s);
   read("brake_rate", o.brake_rate);
   read("ramp_s", o.ramp_s);
+  read("escapes", o.escapes);
+  read("escape_rollouts", o.escape_rollouts);
+  read("escape_horizon_s", o.escape_horizon_s);
+  read("escape_delay_s", o.escape_delay_s);
   read("bus", bus);
 }
 

@@ -68,6 +68,10 @@ Checkpoint::~Checkpoint() {
   if (fd_ >= 0) ::close(fd_);
 }
 
+bool Checkpoint::is_whole(const Slot& s) const noexcept {
+  return s.size <= capacity_ && s.crc == checksum(s.payload, s.size, s.sequence);
+}
+
 std::vector<std::byte> Checkpoint::load(std::string& note) const {
   note.clear();
   const Slot* best = nullptr;
@@ -76,7 +80,7 @@ std::vector<std::byte> Checkpoint::load(std::string& note) const {
     if (s->magic == 0 && s->sequence == 0) continue;  // never written
     if (s->magic != kMagic || s->layout != kLayout || s->kind != kind_) {
       note += "slot of a foreign format passed over; ";
-    } else if (s->size > capacity_ || s->crc != checksum(s->payload, s->size, s->sequence)) {
+    } else if (!is_whole(*s)) {
       note += "damaged slot passed over; ";
     } else if (!best || s->sequence > best->sequence) {
       best = s;
@@ -85,6 +89,13 @@ std::vector<std::byte> Checkpoint::load(std::string& note) const {
   if (!best) return {};
   const_cast<Checkpoint*>(this)->sequence_ = best->sequence;
   return {best->payload, best->payload + best->size};
+}
+
+std::vector<std::byte> Checkpoint::load_older() const {
+  const Slot& s = *slot(static_cast<int>((sequence_ + 1) % 2));
+  const bool ours = s.magic == kMagic && s.layout == kLayout && s.kind == kind_;
+  if (!ours || s.sequence + 1 != sequence_ || !is_whole(s)) return {};
+  return {s.payload, s.payload + s.size};
 }
 
 bool Checkpoint::save(std::span<const std::byte> payload) noexcept {

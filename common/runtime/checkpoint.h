@@ -28,6 +28,8 @@ class Checkpoint {
   /// The newest whole payload; empty when there is none.  `note` says what was passed over and why, else
   /// empty.
   std::vector<std::byte> load(std::string& note) const;
+  /// The payload saved before that one; empty when there is none or it is not whole.
+  std::vector<std::byte> load_older() const;
   /// Replaces the older slot.  False when the payload is larger than the capacity.  No allocation, no system
   /// call.
   bool save(std::span<const std::byte> payload) noexcept;
@@ -38,6 +40,7 @@ class Checkpoint {
   struct Slot;
   Checkpoint() = default;
   Slot* slot(int i) const noexcept;
+  bool is_whole(const Slot& s) const noexcept;
   int fd_ = -1;
   std::byte* map_ = nullptr;
   std::size_t length_ = 0, capacity_ = 0;

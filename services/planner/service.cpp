@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::uint32_t kCheckpointKind = 0x0201;  // planner, layout 1
+constexpr std::uint32_t kCheckpointKind = 0x0202;  // planner, layout 2
 constexpr double kMemoryFresh_s = 0.2;             // realtime: older memory is ramped in again
 constexpr auto kReportPeriod = 10ms;  // realtime: a report each, and one at every change of state
 
@@ -36,6 +36,12 @@ Result<std::unique_ptr<PlannerService>, Problem> PlannerService::make(bus::Node&
   std::string note;
   const auto bytes = s->checkpoint_->load(note);
   if (!note.empty()) spdlog::warn("{}: {}", path, note);
+  const auto older = s->checkpoint_->load_older();
+  if (!older.empty() && s->load(older)) {
+    s->earlier_ = std::make_unique<Earlier>(Earlier{*s->memory_step_, s->planner_.memory()});
+    s->goal_ = scene.goal;  // the newest one's below, if it holds one
+    s->mode_.reset();
+  }
   if (!bytes.empty() && s->load(bytes))
     spdlog::info("resumed at step {} with goal {}", *s->memory_step_, s->goal_ ? s->goal_->id : 0);
   else if (!bytes.empty())
@@ -158,18 +164,35 @@ void PlannerService::meet(const wire::ArmState& s) {
 bool PlannerService::answer(Time now) {
   if (!have_state_ || answered_) return false;
   const bool lockstep = config_.pace == scene::Pace::lockstep;
-  if (lockstep && command_.step == state_.step && memory_step_ == state_.step) {
+  if (lockstep && cycles_ > 0 && command_.step == state_.step && memory_step_ == state_.step) {
     publish_command();
     answered_ = true;
     return true;
   }
   if (lockstep && !view_.covers(state_.t_s)) return false;
+  if (lockstep && memory_step_ == state_.step) rewind();
+  earlier_.reset();
   plan(now);
   answered_ = true;
+  // Killed between any two of these lines, the next planner answers this state again, with the same bits.
+  save();
   publish_command();
   publish_report(now, lockstep);
-  save();
   return true;
+}
+
+/// The planner before us has planned this step and saved it, and may not have lived to send it: plan it again
+/// from what was remembered before it.
+void PlannerService::rewind() {
+  const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
+  if (earlier_ && earlier_->step + period == state_.step) {
+    planner_.restore(earlier_->memory);
+    memory_step_ = earlier_->step;
+  } else if (state_.step == 0) {
+    planner_ = Planner(scene_.robot, scene_.planner);
+    memory_step_.reset();
+  }
+  if (goal_) planner_.set_goal(*goal_);
 }
 
 void PlannerService::plan(Time now) {
@@ -186,6 +209,7 @@ void PlannerService::plan(Time now) {
         memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
     if (!memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s) planner_.ramp_in();
   }
+  const bool lockstep = config_.pace == scene::Pace::lockstep;  // time waits: nothing is ever old
   const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;
   const Input in{.step = state_.step,
                  .t_s = state_.t_s,
@@ -194,12 +218,46 @@ void PlannerService::plan(Time now) {
                  .qd = qd_,
                  .obstacles = obstacles_,
                  .obstacle_age_s = obstacle_age_s_,
-                 .state_age_s = std::chrono::duration<double>(now - last_state_).count(),
+                 .state_age_s = lockstep ? 0 : std::chrono::duration<double>(now - last_state_).count(),
                  .obstacles_expected = true};
+  take_escape();
   planner_.plan(in, output_);
+  if (output_.report.escape_asked) ask_escape(in);
   memory_step_ = state_.step;
   ++cycles_;
   cycle_s_ = std::chrono::duration<double>(runtime::Clock::now() - began).count();
+}
+
+/// Rollouts run beside the control thread; their answer enters at a step known beforehand, so that results do
+/// not depend on the thread's speed.
+void PlannerService::ask_escape(const Input& in) {
+  escape_asked_ = in.step;
+  escape_due_ = in.step + planner_.escape_steps(state_.dt_s);
+  escape_ = std::async(std::launch::async, [this, question = planner_.escape_question(in)] {
+    return find_escape(scene_.robot, scene_.planner, question);
+  });
+  spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
+}
+
+/// Lockstep waits for an answer that is due; real time takes it once it is there.
+void PlannerService::take_escape() {
+  const Waypoint& w = planner_.memory().waypoint;
+  if (w.waiting != 0 && (!escape_.valid() || w.asked_step != escape_asked_)) {
+    planner_.take_escape({},
+                         state_.t_s);  // the question died with the planner before us: it will be asked again
+    return;
+  }
+  if (!escape_.valid() || state_.step < escape_due_) return;
+  const bool lockstep = config_.pace == scene::Pace::lockstep;
+  if (!lockstep && escape_.wait_for(0s) != std::future_status::ready) return;
+  const Escape escape = escape_.get();
+  if (w.waiting == 0) return;  // another goal meanwhile
+  if (escape.found)
+    spdlog::info("t = {:.3f} s: waypoint {} leads out; goal expected in {:.1f} s", state_.t_s,
+                 escape.rollouts, escape.reached_after_s);
+  else
+    spdlog::info("t = {:.3f} s: {} rollouts found no way out", state_.t_s, escape.rollouts);
+  planner_.take_escape(escape.waypoint, state_.t_s);
 }
 
 void PlannerService::publish_command() {

@@ -2,6 +2,7 @@
 /// The planner service in its shell: states, obstacles, goals and modes in, commands and reports out.
 
 #include <algorithm>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include "common/runtime/log.h"
 #include "common/runtime/loop.h"
 #include "common/wire/endpoint.h"
+#include "services/planner/core/escape.h"
 #include "services/planner/core/planner.h"
 #include "services/planner/obstacle_view.h"
 
@@ -42,12 +44,15 @@ class PlannerService final : public runtime::Service {
   void meet(const wire::ArmState& s);
   bool answer(Time now);
   void plan(Time now);
+  void ask_escape(const Input& in);
+  void take_escape();
   void publish_command();
   void publish_report(Time now, bool always);
   void report_silence(Time now);
   void publish_status(Time now, wire::ServiceState state);
   void save();
   bool load(std::span<const std::byte> bytes);
+  void rewind();
 
   const scene::Scene scene_;
   const ServiceConfig config_;
@@ -78,6 +83,12 @@ class PlannerService final : public runtime::Service {
   bool have_state_ = false, answered_ = true;  ///< answered: the newest state has its command
   std::optional<std::uint64_t> incarnation_;   ///< of the arm we know
   std::optional<std::uint64_t> memory_step_;   ///< the step our memory stands at
+  /// After a restart: what we remembered one cycle earlier, in case that step's command was never sent.
+  struct Earlier {
+    std::uint64_t step = 0;
+    Memory memory;
+  };
+  std::unique_ptr<Earlier> earlier_;
   std::optional<wire::Mode> mode_;
   std::uint64_t mode_id_ = 0, commands_late_ = 0, cycles_ = 0;
   wire::PlannerState shown_ = wire::PlannerState::idle;
@@ -86,6 +97,9 @@ class PlannerService final : public runtime::Service {
   Time last_state_{}, last_report_{}, last_silence_{}, last_status_{}, last_sync_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
+  std::future<Escape>
+      escape_;  ///< valid: a question is out, asked at escape_asked_, its answer due at escape_due_
+  std::uint64_t escape_asked_ = 0, escape_due_ = 0;
   runtime::RateLimit refusals_;
 };
 

@@ -53,6 +53,19 @@ TEST_F(CheckpointTest, GivesBackTheLastSavedAfterReopening) {
   EXPECT_EQ(c->load(note), payload(10, 5));
 }
 
+TEST_F(CheckpointTest, GivesBackTheOneBeforeToo) {
+  {
+    const auto c = open();
+    EXPECT_TRUE(c->save(payload(1, 10)));
+    EXPECT_TRUE(c->load_older().empty());
+    EXPECT_TRUE(c->save(payload(2, 20)));
+    EXPECT_TRUE(c->save(payload(3, 30)));
+  }
+  const auto c = open();
+  EXPECT_EQ(c->load(note), payload(3, 30));
+  EXPECT_EQ(c->load_older(), payload(2, 20));
+}
+
 TEST_F(CheckpointTest, RefusesWhatDoesNotFit) {
   const auto c = open();
   EXPECT_TRUE(c->save(payload(1, kCapacity)));

@@ -26,14 +26,54 @@ void move(geometry::Obstacle& o, double age_s) {
   if (angle > 1e-12) o.X_WO.R = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * o.X_WO.R;
 }
 
+constexpr double kForget_s = 1;      // a gap after which an obstacle counts as new
+constexpr double kFastest_mps = 10;  // a jump faster than this is a wrong sample, not a motion
+
+// The table's entry of an obstacle, a new one, or null where the table is full of fresher ones.
+Sighting* sighting(Memory& m, std::uint32_t id, double stamp_s) {
+  const auto end = m.sightings.begin() + static_cast<std::ptrdiff_t>(m.sighting_count);
+  const auto it = std::find_if(m.sightings.begin(), end, [&](const Sighting& s) { return s.obstacle == id; });
+  if (it != end) return &*it;
+  Sighting* free = nullptr;
+  if (m.sighting_count < m.sightings.size())
+    free = &m.sightings[m.sighting_count++];
+  else
+    for (Sighting& s : m.sightings)
+      if (std::abs(stamp_s - s.stamp_s) > kForget_s) free = &s;
+  if (free) *free = Sighting{id, stamp_s, {}, {}, 2};  // 2: seen by nobody yet
+  return free;
+}
+
+// The velocity of an obstacle that does not tell it; false: not known yet.
+bool estimate(Memory& m, const geometry::Obstacle& o, double stamp_s, Vector3d& velocity) {
+  Sighting* s = sighting(m, o.id, stamp_s);
+  if (!s) return false;
+  const double passed_s = stamp_s - s->stamp_s;
+  const Vector3d at(s->at[0], s->at[1], s->at[2]), before(s->velocity[0], s->velocity[1], s->velocity[2]);
+  if (s->known != 2 && std::abs(passed_s) < 1e-9) {
+    velocity = before;
+    return s->known == 1;
+  }
+  const Vector3d now = (o.X_WO.p - at) / passed_s;
+  const bool trusted = s->known != 2 && passed_s > 0 && passed_s < kForget_s && now.norm() < kFastest_mps;
+  velocity = trusted ? s->known == 1 ? Vector3d(0.5 * (before + now)) : now : Vector3d::Zero();
+  *s = Sighting{o.id,
+                stamp_s,
+                {o.X_WO.p[0], o.X_WO.p[1], o.X_WO.p[2]},
+                {velocity[0], velocity[1], velocity[2]},
+                trusted ? 1u : 0u};
+  return trusted;
+}
+
 }  // namespace
 
 Obstacles::Obstacles() { items_.reserve(kMost); }
 
-void Obstacles::take(std::span<const geometry::Obstacle> stamped, double age_s,
-                     const scene::PlannerOptions& o) noexcept {
+void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, double age_s,
+                     const scene::PlannerOptions& o, Memory& memory) noexcept {
   items_.clear();
   all_finite_ = true;
+  estimated_ = unknown_ = 0;
   too_many_ = stamped.size() > kMost;
   const double age = std::isfinite(age_s) ? std::max(age_s, 0.0) : 0.0;
   for (const geometry::Obstacle& s : stamped.first(std::min(stamped.size(), kMost))) {
@@ -44,7 +84,14 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double age_s,
     Item item{s, 2 * std::max(s.sigma_m, 0.0), items_.size()};
     if (!s.velocity_known) {
       item.now.V_WO.setZero();
-      item.inflation_m += o.assumed_speed_mps * age;
+      Vector3d velocity;
+      if (estimate(memory, s, t_s - age, velocity)) {
+        item.now.V_WO.tail<3>() = velocity;
+        ++estimated_;
+      } else {
+        item.inflation_m += o.assumed_speed_mps * age;
+        ++unknown_;
+      }
     }
     move(item.now, age);
     items_.push_back(item);

@@ -21,10 +21,11 @@ class Obstacles {
  public:
   static constexpr std::size_t kMost = 4096;
   Obstacles();
-  /// Takes a set `age_s` old.  A moving obstacle goes on with its twist; one of unknown velocity stays and
-  /// grows.
-  void take(std::span<const geometry::Obstacle> stamped, double age_s,
-            const scene::PlannerOptions& o) noexcept;
+  /// Takes a set `age_s` old at time t_s.  A moving obstacle goes on with its twist.  One of unknown velocity
+  /// is watched: from its second set on it goes on with the velocity between the last two (the mean of that
+  /// and the one before), until then, or where none can be made out, it stays and grows.
+  void take(std::span<const geometry::Obstacle> stamped, double t_s, double age_s,
+            const scene::PlannerOptions& o, Memory& memory) noexcept;
 
   struct Item {
     geometry::Obstacle now;
@@ -32,11 +33,14 @@ class Obstacles {
     std::size_t order = 0;   ///< in the input
   };
   std::span<const Item> items() const noexcept { return items_; }
+  int velocities_estimated() const noexcept { return estimated_; }
+  int velocities_unknown() const noexcept { return unknown_; }
   bool all_finite() const noexcept { return all_finite_; }
   bool too_many() const noexcept { return too_many_; }
 
  private:
   std::vector<Item> items_;
+  int estimated_ = 0, unknown_ = 0;
   bool all_finite_ = true, too_many_ = false;
 };
 
