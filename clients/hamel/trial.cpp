@@ -7,6 +7,7 @@
 #include "common/rbd/rbd.h"
 #include "services/dynamics/arm.h"
 #include "services/perception/core/source.h"
+#include "services/planner/core/escape.h"
 
 namespace hamel::client {
 
@@ -186,12 +187,20 @@ class Run {
                             .qd = arm_.state().qd,
                             .obstacles = senses_.seen(),
                             .obstacle_age_s = senses_.age_s};
+    if (escape_due_ && in.step >= *escape_due_) {
+      planner_.take_escape(escape_.waypoint, t_s);
+      escape_due_.reset();
+    }
     const double began_s = options_.now_s ? options_.now_s() : 0;
     planner_.plan(in, out_);
     if (options_.now_s) trial_.cycle.add(options_.now_s() - began_s);
     ++trial_.cycles;
     trial_.unsafe_cycles += out_.report.state == planner::State::unsafe;
     trial_.unreported_contacts += touching_ && out_.report.reason != planner::Reason::contact;
+    if (out_.report.escape_asked) {
+      escape_ = planner::find_escape(scene_.robot, scene_.planner, planner_.escape_question(in));
+      escape_due_ = in.step + planner_.escape_steps(scene_.dynamics.dt_s);
+    }
     trial_.infeasible_cycles += out_.report.reason == planner::Reason::infeasible;
   }
 
@@ -209,6 +218,8 @@ class Run {
   dynamics::Arm arm_;
   planner::Planner planner_;
   planner::Output out_;
+  planner::Escape escape_;
+  std::optional<std::uint64_t> escape_due_;
   Judge judge_;
   Arrival arrival_;
   std::vector<geometry::Obstacle> truth_;

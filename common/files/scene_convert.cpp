@@ -142,6 +142,10 @@ void read_planner(const Fields& read, scene::PlannerOptions& o, std::string& bus
   read("brake_rate", o.brake_rate);
   read("ramp_s", o.ramp_s);
   read("unreachable", o.unreachable);
+  read("escapes", o.escapes);
+  read("escape_rollouts", o.escape_rollouts);
+  read("escape_horizon_s", o.escape_horizon_s);
+  read("escape_delay_s", o.escape_delay_s);
   read("bus", bus);
 }
 

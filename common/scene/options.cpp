@@ -58,6 +58,10 @@ void check_states(const PlannerOptions& o, Rules& r) {
   r.positive("brake_rate", o.brake_rate);
   r.not_negative("assumed_speed_mps", o.assumed_speed_mps);
   r.not_negative("ramp_s", o.ramp_s);
+  r.must(o.escapes >= 0, "escapes", o.escapes, ">= 0");
+  r.must(o.escape_rollouts >= 1, "escape_rollouts", o.escape_rollouts, ">= 1");
+  r.positive("escape_horizon_s", o.escape_horizon_s);
+  r.not_negative("escape_delay_s", o.escape_delay_s);
 }
 
 }  // namespace

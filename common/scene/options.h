@@ -66,7 +66,7 @@ struct PlannerOptions {
   double lambda2 = 1e-3;           ///< damping of operational-space inertia, > 0
   bool lambda2_relative = true;    ///< true: times trace(J M^-1 J^T); false: absolute [1/kg]
   double dmin_m = 0.01;            ///< clearance the barrier keeps, >= 0; barrier off where barrier_gain is 0
-  double barrier_gain = 12;        ///< gyro: of the barrier, h.. + 2 g h. + g^2 h >= 0 [1/s], 0: off
+  double barrier_gain = 30;        ///< gyro: of the barrier, h.. + 2 g h. + g^2 h >= 0 [1/s], 0: off
   double kc = 2;                   ///< gyro: held-direction circulation, 0 or > 1 (1 allowed on spatial arms)
   double flip_time_s = 3;          ///< circulation flips when the error has not fallen 10 % in it, > 0
   double limit_weight = 0;         ///< of joints near their limits in the attraction, 0: plain
@@ -81,7 +81,11 @@ struct PlannerOptions {
   double stale_state_s = 0.05;         ///< arm state older than this: brake and UNSAFE, > 0
   double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
   double assumed_speed_mps =
-      0;  ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
+      0;                        ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
+  int escapes = 4;              ///< gyro: ways out looked for by rollouts while stuck at one goal, 0: none
+  int escape_rollouts = 16;     ///< waypoints tried for one way out, >= 1
+  double escape_horizon_s = 8;  ///< how far ahead a rollout looks, > 0
+  double escape_delay_s = 0.2;  ///< the answer enters so long after the question, >= 0
   /// A target that no configuration meets: STUCK at once and no motion, or as near as can be and then STUCK.
   Unreachable unreachable = Unreachable::reject;
   double ramp_s = 0.2;  ///< after a restart without memory the command ramps in over it, >= 0

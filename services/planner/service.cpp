@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::uint32_t kCheckpointKind = 0x0202;  // planner, layout 2
+constexpr std::uint32_t kCheckpointKind = 0x0203;  // planner, layout 3
 constexpr auto kArmHeard = 200ms;  // an arm speaks at least each 100 ms: so long no other is heard
 constexpr std::uint32_t kArmBits = 0x0fffffff;  // of an obstacle source: the arm it sees for
 constexpr double kMemoryFresh_s = 0.2;          // realtime: older memory is ramped in again
@@ -190,6 +190,7 @@ void PlannerService::plan(Time now) {
         memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
     if (!memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s) planner_.ramp_in();
   }
+  const bool lockstep = config_.pace == scene::Pace::lockstep;  // time waits: nothing is ever old
   const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;
   const Input in{.step = state_.step,
                  .t_s = state_.t_s,
@@ -199,12 +200,46 @@ void PlannerService::plan(Time now) {
                  .obstacles = obstacles_,
                  .obstacle_age_s = obstacle_age_s_,
                  .obstacle_set = view_.set(),
-                 .state_age_s = std::chrono::duration<double>(now - last_state_).count(),
+                 .state_age_s = lockstep ? 0 : std::chrono::duration<double>(now - last_state_).count(),
                  .obstacles_expected = true};
+  take_escape();
   planner_.plan(in, output_);
+  if (output_.report.escape_asked) ask_escape(in);
   memory_step_ = state_.step;
   ++cycles_;
   cycle_s_ = std::chrono::duration<double>(runtime::Clock::now() - began).count();
+}
+
+/// Rollouts run beside the control thread; their answer enters at a step known beforehand, so that results do
+/// not depend on the thread's speed.
+void PlannerService::ask_escape(const Input& in) {
+  escape_asked_ = in.step;
+  escape_due_ = in.step + planner_.escape_steps(state_.dt_s);
+  escape_ = std::async(std::launch::async, [this, question = planner_.escape_question(in)] {
+    return find_escape(scene_.robot, scene_.planner, question);
+  });
+  spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
+}
+
+/// Lockstep waits for an answer that is due; real time takes it once it is there.
+void PlannerService::take_escape() {
+  const Waypoint& w = planner_.memory().waypoint;
+  if (w.waiting != 0 && (!escape_.valid() || w.asked_step != escape_asked_)) {
+    planner_.take_escape({},
+                         state_.t_s);  // the question died with the planner before us: it will be asked again
+    return;
+  }
+  if (!escape_.valid() || state_.step < escape_due_) return;
+  const bool lockstep = config_.pace == scene::Pace::lockstep;
+  if (!lockstep && escape_.wait_for(0s) != std::future_status::ready) return;
+  const Escape escape = escape_.get();
+  if (w.waiting == 0) return;  // another goal meanwhile
+  if (escape.found)
+    spdlog::info("t = {:.3f} s: waypoint {} leads out; goal expected in {:.1f} s", state_.t_s,
+                 escape.rollouts, escape.reached_after_s);
+  else
+    spdlog::info("t = {:.3f} s: {} rollouts found no way out", state_.t_s, escape.rollouts);
+  planner_.take_escape(escape.waypoint, state_.t_s);
 }
 
 void PlannerService::fill_command() {

@@ -2,6 +2,7 @@
 /// The planner service in its shell: states, obstacles, goals and modes in, commands and reports out.
 
 #include <algorithm>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "common/runtime/loop.h"
 #include "common/runtime/presence.h"
 #include "common/wire/endpoint.h"
+#include "services/planner/core/escape.h"
 #include "services/planner/core/planner.h"
 #include "services/planner/obstacle_view.h"
 
@@ -44,6 +46,8 @@ class PlannerService final : public runtime::Service {
   void meet(const wire::ArmState& s);
   bool answer(Time now);
   void plan(Time now);
+  void ask_escape(const Input& in);
+  void take_escape();
   void fill_command();
   void publish_report(Time now, bool always);
   void report_silence(Time now);
@@ -88,6 +92,9 @@ class PlannerService final : public runtime::Service {
   Time last_state_{}, last_report_{}, last_silence_{}, last_sync_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
+  std::future<Escape>
+      escape_;  ///< valid: a question is out, asked at escape_asked_, its answer due at escape_due_
+  std::uint64_t escape_asked_ = 0, escape_due_ = 0;
   runtime::RateLimit refusals_;
 };
 

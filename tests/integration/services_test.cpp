@@ -185,6 +185,59 @@ TEST(Restart, InLockstepContinuesBitForBit) {
   std::filesystem::remove_all(folder);
 }
 
+/// A planner that answers states of a moving arm, with its checkpoint in `folder`; the last command it sends.
+wire::TorqueCommand answer(const std::string& folder, std::uint64_t first, std::uint64_t last,
+                           std::uint32_t domain) {
+  const auto n = node(domain);
+  const scene::Scene s = load("four_link_avoid", {"planner.method=gyro"});
+  wire::Publisher<wire::ArmState> states(*n);
+  wire::Publisher<wire::ObstacleSet> sets(*n);
+  wire::Subscription<wire::TorqueCommand> commands(*n);
+  auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder});
+  EXPECT_TRUE(brain);
+  wire::ObstacleSet set;
+  set.source = 1;
+  set.obstacles.push_back(s.perception.obstacles[0].at_start);
+  EXPECT_TRUE(sets.publish(set));
+  wire::TorqueCommand newest;
+  for (std::uint64_t k = first; k <= last; ++k) {
+    wire::ArmState state;
+    state.arm = s.arm;
+    state.incarnation = 1;
+    state.step = k;
+    state.dt_s = 1e-3;
+    state.t_s = 1e-3 * static_cast<double>(k);
+    state.position = wire::JointVector::Constant(4, 0.3 + 0.05 * static_cast<double>(k));
+    state.velocity = wire::JointVector::Constant(4, 0.5);
+    state.momentum = state.torque_applied = wire::JointVector::Zero(4);
+    EXPECT_TRUE(states.publish(state));
+    brain.value()->poll(Clock::now());
+    while (commands.take(newest)) {
+    }
+  }
+  return newest;
+}
+
+// The checkpoint is written before the command is sent: a planner killed in between has answered nobody, and
+// the next one must give that answer.
+TEST(Restart, APlannerKilledBeforeItSpokeIsAnsweredFor) {
+  const std::string folder = testing::TempDir() + "/hamel-spoke-" + std::to_string(getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const auto sent = answer(folder, 0, 9, 7);
+  const auto again = answer(folder, 9, 9, 8);  // the arm still waits at the same state
+  ASSERT_EQ(sent.step, 9u);
+  ASSERT_EQ(again.step, 9u);
+  EXPECT_EQ(std::memcmp(sent.torque.data(), again.torque.data(), 4 * sizeof(double)), 0);
+  EXPECT_EQ(again.epoch, sent.epoch + 1);
+  const auto next = answer(folder, 10, 10, 9);
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const auto never_killed = answer(folder, 0, 10, 10);
+  EXPECT_EQ(std::memcmp(next.torque.data(), never_killed.torque.data(), 4 * sizeof(double)), 0);
+  std::filesystem::remove_all(folder);
+}
+
 wire::ObstacleSet set(double t_s, double next_t_s, std::uint32_t source = 1, std::size_t n = 1) {
   wire::ObstacleSet s;
   s.source = source;

@@ -107,6 +107,24 @@ TEST(Example52, DefaultMethodReachesAndKeepsItsDistance) {
   }
 }
 
+// The four sets of parameters the example was swept with, at 10 ms: (identity), slender rods soft, rods
+// stiff, rods stiff and slow.
+TEST(Example52, DefaultMethodReachesInAllSetsAtTenMilliseconds) {
+  struct Set {
+    double inertia, kp, kv, bj, vmax;
+  };
+  for (const Set& s : {Set{1, 25, 20, 2, scene::kInf}, Set{1.0 / 12, 4, 8, 0.5, scene::kInf},
+                       Set{1.0 / 12, 10, 6.32, 0.5, scene::kInf}, Set{1.0 / 12, 10, 6.32, 2, 1}}) {
+    Example52 e = improved();
+    e.robot = planar_arm(4, s.inertia, 0);
+    e.options.kp = s.kp, e.options.kv = s.kv, e.options.damping = s.bj, e.options.vmax_mps = s.vmax;
+    const RunResult r = run_example(e, 1e-2, 20);
+    EXPECT_EQ(r.last.state, State::reached) << s.kp << " " << s.bj;
+    EXPECT_LE(r.reached_at_s, 18) << s.kp << " " << s.bj;
+    EXPECT_GE(r.clearance_min_m, 0.9 * e.options.dmin_m) << s.kp << " " << s.bj;
+  }
+}
+
 // Kill and restart: wherever the run is cut and the arm stands still, a fresh planner finishes it.
 TEST(Example52, DefaultMethodStartsAgainFromRestAnywhereOnItsWay) {
   const Example52 e = improved();

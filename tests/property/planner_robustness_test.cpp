@@ -7,6 +7,7 @@
 #include "common/rbd/rbd.h"
 #include "tests/support/no_alloc.h"
 #include "tests/support/planner_scene.h"
+#include "tests/support/soak.h"
 
 namespace hamel::test {
 namespace {
@@ -145,7 +146,8 @@ class ForMethod : public testing::TestWithParam<Method> {};
 TEST_P(ForMethod, FuzzedCyclesStayFiniteRepeatAndContinueFromMemory) {
   Random rng(11 + static_cast<unsigned>(GetParam()));
   std::uint64_t moving = 0, nans = 0;
-  for (int robot_index = 0; robot_index < 25; ++robot_index) {
+  const int robots = soak() ? 250 : 25;  // a million cycles over the four methods
+  for (int robot_index = 0; robot_index < robots; ++robot_index) {
     const int n = 1 + robot_index % 8;
     const scene::Robot robot = random_robot(rng, n);
     const scene::PlannerOptions o = random_options(rng, GetParam());

@@ -11,6 +11,7 @@
 
 #include "common/scene/scene.h"
 #include "services/dynamics/core/integrator.h"
+#include "services/planner/core/escape.h"
 #include "services/planner/core/planner.h"
 #include "tests/support/chains.h"
 
@@ -78,12 +79,13 @@ struct RunResult {
   double clearance_min_m = std::numeric_limits<double>::infinity();
   planner::Reason stuck_reason = planner::Reason::none;
   int infeasible_cycles = 0;
-  double gyro_work_J = 0;
+  double gyro_work_J = 0, variation_radps3 = 0;  ///< variation: mean |change of qdd| a second
+  int escapes = 0;                               ///< waypoints taken
   Eigen::VectorXd q, qd;
 };
 
 /// Runs planner and midpoint integrator for duration_s, on past REACHED and STUCK.  Spheres move with their
-/// velocity.
+/// velocity.  A planner that asks for an escape is answered, after its delay.
 inline RunResult run(const scene::Robot& robot, std::vector<geometry::Obstacle> obstacles,
                      const scene::PlannerOptions& options, const scene::Goal& goal, const Eigen::VectorXd& q0,
                      double dt_s, double duration_s, const std::function<bool(const RunResult&)>& stop = {}) {
@@ -95,12 +97,24 @@ inline RunResult run(const scene::Robot& robot, std::vector<geometry::Obstacle> 
   dynamics::State state = dynamics.start(q0, Eigen::VectorXd::Zero(q0.size()));
   planner::Output out = planner.output();
   RunResult r;
+  planner::Escape escape;
+  std::uint64_t escape_due = 0;
+  Eigen::VectorXd qd_before = state.qd, qdd_before = state.qd;
   const auto steps = static_cast<std::uint64_t>(std::llround(duration_s / dt_s));
   for (std::uint64_t k = 0; k <= steps; ++k) {
     const double t = static_cast<double>(k) * dt_s;
     const planner::Input in{
         .step = k, .t_s = t, .dt_s = dt_s, .q = state.q, .qd = state.qd, .obstacles = obstacles};
+    if (escape_due > 0 && k >= escape_due) {
+      planner.take_escape(escape.waypoint, t);
+      r.escapes += escape.found;
+      escape_due = 0;
+    }
     planner.plan(in, out);
+    if (out.report.escape_asked) {
+      escape = planner::find_escape(robot, options, planner.escape_question(in));
+      escape_due = k + planner.escape_steps(dt_s);
+    }
     r.last = out.report;
     r.clearance_min_m = out.report.clearance_min_m;
     r.gyro_work_J += out.report.gyroscopic_power_W * dt_s;
@@ -116,6 +130,10 @@ inline RunResult run(const scene::Robot& robot, std::vector<geometry::Obstacle> 
       ADD_FAILURE() << "the integrator gave up at " << t << " s";
       break;
     }
+    const Eigen::VectorXd qdd = (state.qd - qd_before) / dt_s;
+    if (k > 0) r.variation_radps3 += (qdd - qdd_before).lpNorm<1>() / duration_s;
+    qd_before = state.qd;
+    qdd_before = qdd;
     for (geometry::Obstacle& o : obstacles) o.X_WO.p += dt_s * o.V_WO.tail<3>();
   }
   r.final_error_m = r.last.target_error_m;

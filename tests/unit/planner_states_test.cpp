@@ -205,6 +205,7 @@ TEST(States, JointLimitIsNamed) {
   b.q = Eigen::VectorXd::Constant(1, 2.5);
   b.qd = Eigen::VectorXd::Zero(1);
   b.goal.X_WG.p = {std::cos(2.5), -std::sin(2.5), 0};  // the short way leads over the limit
+  b.options.escapes = 0;
   b.obstacles.clear();
   const RunResult r = b.go(10);
   EXPECT_EQ(r.last.state, State::stuck);

@@ -118,6 +118,10 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"planner.stale_brake_s", "> 0", [](Scene& s) { s.planner.stale_brake_s = 0; }},
         Case{"planner.stale_slow_s", "> 0", [](Scene& s) { s.planner.stale_slow_s = 0; }},
         Case{"planner.stale_slow_s", "<= stale_brake_s", [](Scene& s) { s.planner.stale_slow_s = 1; }},
+        Case{"planner.escapes", ">= 0", [](Scene& s) { s.planner.escapes = -1; }},
+        Case{"planner.escape_rollouts", ">= 1", [](Scene& s) { s.planner.escape_rollouts = 0; }},
+        Case{"planner.escape_horizon_s", "> 0", [](Scene& s) { s.planner.escape_horizon_s = 0; }},
+        Case{"planner.escape_delay_s", ">= 0", [](Scene& s) { s.planner.escape_delay_s = -1; }},
         Case{"planner.assumed_speed_mps", ">= 0", [](Scene& s) { s.planner.assumed_speed_mps = -1; }},
         Case{"planner.ramp_s", ">= 0", [](Scene& s) { s.planner.ramp_s = -1; }},
         Case{"planner.bus", "must be inproc", [](Scene& s) { s.bus.planner = std::string("x"); }}));

@@ -29,8 +29,9 @@ double reach(const model::Chain& chain) {
 
 }  // namespace
 
-Arm::Arm(const model::Chain& with_gravity)
-    : chain(weightless(with_gravity)),
+Arm::Arm(const model::Chain& as_given)
+    : chain(weightless(as_given)),
+      with_gravity(as_given),
       ws(chain),
       q(Eigen::VectorXd::Zero(n())),
       qd(q),
@@ -38,6 +39,7 @@ Arm::Arm(const model::Chain& with_gravity)
       M_inverse(M),
       M_llt(M),
       coriolis(q),
+      gravity(q),
       J_E(Eigen::MatrixXd::Zero(6, n())),
       reach_m(reach(chain)),
       shoulder_W(chain.X_WB0() * chain.joint(0).X_PJ.p) {}
@@ -55,6 +57,7 @@ void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) no
   qd.setZero();  // serves as the zero acceleration
   rbd::inverse_dynamics(chain, q_now, qd_now, qd, ws, coriolis);
   look(q_now, qd_now);
+  rbd::gravity_torque(with_gravity, ws, gravity);
   rbd::mass_matrix(chain, ws, M);
   M_llt.compute(M);
   M_inverse.setIdentity();

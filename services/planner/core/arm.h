@@ -21,12 +21,14 @@ struct Arm {
   /// Angular velocity of a link, world axes.
   Eigen::Vector3d angular_velocity(int link) const noexcept;
 
-  model::Chain chain;  ///< without gravity
+  model::Chain chain;         ///< without gravity
+  model::Chain with_gravity;  ///< as given
   rbd::Workspace ws;
   Eigen::VectorXd q, qd;
   Eigen::MatrixXd M, M_inverse;
   Eigen::LLT<Eigen::MatrixXd> M_llt;
   Eigen::VectorXd coriolis;  ///< c(q, qd)
+  Eigen::VectorXd gravity;   ///< torque that holds the arm, which another adds to ours
   lie::Pose X_WE;
   Eigen::MatrixXd J_E;  ///< 6 x n at the end effector: (omega, v), world axes
   lie::Twist V_WE = lie::Twist::Zero();

@@ -75,6 +75,12 @@ void Attraction::toward_joints(const Arm& arm, const scene::Goal& goal, double s
   qdd_ *= tip_speed > options_.vmax_mps ? slow * options_.vmax_mps / tip_speed : slow;
   qdd_ = -options_.kv * (arm.qd - qdd_);
   torque_.noalias() = arm.M * qdd_;
+  potential_ = 0;
+  for (int j = 0; j < arm.n(); ++j) {
+    const double e_j = goal.joints[j] - arm.q[j];
+    for (int i = 0; i < arm.n(); ++i)
+      potential_ += 0.5 * options_.kp * (goal.joints[i] - arm.q[i]) * arm.M(i, j) * e_j;
+  }
   error_ = {(goal.joints - arm.q).lpNorm<Eigen::Infinity>(), 0, 0};
   error_.scaled = error_.position_m / options_.goal_tolerance_joint;
 }
@@ -101,6 +107,8 @@ void Attraction::map(const Arm& arm, Eigen::Index rows) noexcept {
   if (rows == 3) a_.head<3>().setZero();
   const Eigen::Matrix<double, 6, 1> f = Lam_inverse_.llt().solve(a_);
   torque_.noalias() = arm.J_E.transpose().lazyProduct(f);
+  const double a2 = a_.squaredNorm(), e = error_.position_m, inertia = a2 > 0 ? f.dot(a_) / a2 : 0;
+  potential_ = 0.5 * options_.kp * inertia * (e * e + error_.angle_rad * error_.angle_rad);
   qdd_.noalias() = arm.M_inverse * torque_;
 }
 

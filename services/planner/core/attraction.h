@@ -30,6 +30,8 @@ class Attraction {
 
   const Eigen::VectorXd& torque() const noexcept { return torque_; }
   const GoalError& error() const noexcept { return error_; }
+  /// kp/2 e^T Lam e, with the inertia along the wanted acceleration for Lam: energy of the pull [J].
+  double potential_J() const noexcept { return potential_; }
   /// Where the target is now, world (the tip where the goal is of joints).
   const Eigen::Vector3d& target_W() const noexcept { return target_W_; }
   /// A joint target lies outside the joint limits.
@@ -46,6 +48,7 @@ class Attraction {
 
   const scene::PlannerOptions& options_;
   GoalError error_;
+  double potential_ = 0;
   Eigen::Vector3d target_W_ = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 6, 1> a_ =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< angular part unused for positions

@@ -12,11 +12,18 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// A row that joints act on with less than this part of the end effector's mobility is one nothing can be done
-// about (an obstacle coming at the pedestal): trying would throw the arm about.
-constexpr double kImmovable = 1e-4;
-constexpr double kWildest = 1e3;       // no joint is accelerated harder by the barrier [rad/s^2 or m/s^2]
 constexpr double kLimitHorizon = 0.5;  // joint rows begin so far from a limit [rad or m]
+
+constexpr double kGainPerStep = 0.25;  // gain times period at most: beyond it a step overshoots
+
+// What a miss of 1 m/s^2 (rad/s^2, N m) costs: price/2 its square, beside 1/2 (a - a0)^T M (a - a0).  A
+// distance under a push of 100 N is missed by 100 N/price/g^2, below 0.1 mm; one that joints hardly act on
+// (an obstacle coming at the pedestal) is missed before it throws the arm about.
+constexpr double kDistancePrice = 1e4;
+constexpr double kSpeedPrice = 1;
+constexpr double kJointPrice = 1e6;
+constexpr double kTorquePrice = 1e6;
+constexpr double kLeastGive = 1e-7;
 
 }  // namespace
 
@@ -51,34 +58,33 @@ double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept
 }
 
 Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options)
-    : options_(options), least_norm_(arm.n(), static_cast<Eigen::Index>(Pairs::kMost) + 4 * arm.n()) {
-  const Eigen::Index most = static_cast<Eigen::Index>(Pairs::kMost) + 4 * arm.n();
-  A_ = Eigen::MatrixXd::Zero(arm.n(), most + 1);  // one spare: a row is written before it is judged
+    : options_(options), least_norm_(arm.n(), static_cast<Eigen::Index>(Pairs::kMost) + 8 * arm.n()) {
+  const Eigen::Index most = static_cast<Eigen::Index>(Pairs::kMost) + 8 * arm.n();
+  A_ = Eigen::MatrixXd::Zero(arm.n(), most);
   C_ = A_;
-  b_ = s_ = length_ = VectorXd::Zero(most + 1);
+  b_ = s_ = length_ = give_ = VectorXd::Zero(most);
   x_ = VectorXd::Zero(arm.n());
   pair_of_row_.reserve(Pairs::kMost);
 }
 
 // A_.col(rows_) is filled; finishes the row unless nothing can act on it.
-void Barrier::add_row(const Arm& arm, double b, double least_mobility) noexcept {
+void Barrier::add_row(const Arm& arm, double b, double price) noexcept {
   auto c = C_.col(rows_);
   c = A_.col(rows_);
   arm.M_llt.matrixL().solveInPlace(c);
   const double length = c.norm();
-  if (!(length * length > least_mobility) || !std::isfinite(b)) return;
+  if (!(length > 1e-9) || !std::isfinite(length) || !std::isfinite(b)) return;
   c /= length;
   length_[rows_] = length;
+  give_[rows_] = std::max(1 / (price * length * length), kLeastGive);
   b_[rows_] = b;
   ++rows_;
 }
 
 void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
-  const double g = options_.barrier_gain;
+  const double g = gain_;
   const auto items = pairs.guarded();
   pair_of_row_.clear();
-  const auto J_tip = arm.J_E.bottomRows<3>();
-  const double least = kImmovable * J_tip.cwiseProduct(J_tip.lazyProduct(arm.M_inverse)).sum();
   for (std::size_t k = 0; k < items.size(); ++k) {
     Pair& pair = items[k];
     pair.multiplier = 0;
@@ -88,50 +94,73 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
     const double curvature = std::min(distance_curvature(pair, omega), 0.0);
     A_.col(rows_).noalias() = -pairs.J(k).transpose().lazyProduct(pair.n);
     const Eigen::Index before = rows_;
-    add_row(arm, -2 * g * hd - g * g * h + pair.n.dot(bias) - curvature, least);
+    add_row(arm, -2 * g * hd - g * g * h + pair.n.dot(bias) - curvature, kDistancePrice);
     if (rows_ > before) pair_of_row_.push_back(k);
   }
 }
 
-void Barrier::add_joint_rows(const Arm& arm) noexcept {
-  const double g = options_.barrier_gain;
-  const auto row = [&](int j, double sign, double b) {  // sign * a_j >= b
+// Limits of position like distances; speed may close half of what is left to its limit in a time 1/g, and in
+// one period never all of it.
+void Barrier::add_joint_rows(const Arm& arm, double dt_s) noexcept {
+  const double g = gain_, rate = std::min(g, 1 / dt_s);
+  const auto row = [&](int j, double sign, double b, double price) {  // sign * a_j >= b
     A_.col(rows_).setZero();
     A_(j, rows_) = sign;
-    add_row(arm, b, 0);
+    add_row(arm, b, price);
   };
   for (int j = 0; j < arm.n(); ++j) {
     const model::JointLimits& limits = arm.chain.joint(j).limits;
     const double q = arm.q[j], qd = arm.qd[j], near = std::max(kLimitHorizon, 2 * std::abs(qd) / g);
-    if (q - limits.lower < near) row(j, 1, -2 * g * qd - g * g * (q - limits.lower));
-    if (limits.upper - q < near) row(j, -1, 2 * g * qd - g * g * (limits.upper - q));
-    if (-qd > 0.5 * limits.velocity) row(j, 1, -g * (limits.velocity + qd));
-    if (qd > 0.5 * limits.velocity) row(j, -1, -g * (limits.velocity - qd));
+    if (q - limits.lower < near) row(j, 1, -2 * g * qd - g * g * (q - limits.lower), kJointPrice);
+    if (limits.upper - q < near) row(j, -1, 2 * g * qd - g * g * (limits.upper - q), kJointPrice);
+  }
+  hard_rows_ = rows_;
+  for (int j = 0; j < arm.n(); ++j) {
+    const model::JointLimits& limits = arm.chain.joint(j).limits;
+    const double qd = arm.qd[j];
+    row(j, 1, std::max(-rate * (limits.velocity + qd), -limits.acceleration), kSpeedPrice);
+    row(j, -1, std::max(-rate * (limits.velocity - qd), -limits.acceleration), kSpeedPrice);
   }
 }
 
-Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, VectorXd& a) noexcept {
+// |M a + c + gravity| <= effort.
+void Barrier::add_torque_rows(const Arm& arm) noexcept {
+  torque_row_ = rows_;
+  for (int j = 0; j < arm.n(); ++j) {
+    const double limit = arm.chain.joint(j).limits.effort, rest = arm.coriolis[j] + arm.gravity[j];
+    if (!std::isfinite(limit)) continue;
+    A_.col(rows_) = arm.M.col(j);
+    add_row(arm, -limit - rest, kTorquePrice);
+    A_.col(rows_) = -arm.M.col(j);
+    add_row(arm, -limit + rest, kTorquePrice);
+  }
+}
+
+Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& a) noexcept {
   rows_ = 0;
+  gain_ = std::min(options_.barrier_gain, kGainPerStep / dt_s);
   add_pair_rows(arm, pairs);
-  add_joint_rows(arm);
+  add_joint_rows(arm, dt_s);
+  add_torque_rows(arm);
   for (Eigen::Index i = 0; i < rows_; ++i) s_[i] = (b_[i] - A_.col(i).dot(a)) / length_[i];
-  const LeastNorm::Outcome found = least_norm_.solve(C_, s_, rows_);
+  const bool solved = least_norm_.solve(C_, s_, give_, rows_);
+  const VectorXd& u = least_norm_.multipliers();
   Outcome outcome;
   outcome.rows = static_cast<int>(rows_);
   outcome.steps = least_norm_.steps();
   outcome.active = least_norm_.steps() > 0;
-  outcome.infeasible = found != LeastNorm::Outcome::solved;
+  // A miss m for ever costs m/g^2 of distance.
+  const double g = gain_, afford = 0.5 * g * g * std::max(options_.dmin_m, 1e-3);
+  outcome.infeasible = !solved;
+  for (Eigen::Index i = 0; i < hard_rows_; ++i)
+    if (give_[i] * u[i] * length_[i] > afford) outcome.infeasible = true;
+  for (Eigen::Index i = torque_row_; i < rows_; ++i) outcome.torque_bound |= u[i] > 0;
   x_ = least_norm_.x();
   arm.M_llt.matrixU().solveInPlace(x_);
-  const double largest = x_.lpNorm<Eigen::Infinity>();
-  if (largest > kWildest) {
-    x_ *= kWildest / largest;
-    outcome.infeasible = true;
-  }
   a += x_;
   for (std::size_t r = 0; r < pair_of_row_.size(); ++r) {
     const auto row = static_cast<Eigen::Index>(r);  // pairs come first
-    pairs.guarded()[pair_of_row_[r]].multiplier = least_norm_.multipliers()[row] / length_[row];
+    pairs.guarded()[pair_of_row_[r]].multiplier = u[row] / length_[row];
   }
   return outcome;
 }

@@ -22,28 +22,34 @@ class Barrier {
 
   struct Outcome {
     int rows = 0, steps = 0;
-    bool active = false;      ///< some row pushed
-    bool infeasible = false;  ///< the rows contradict each other: no acceleration meets them all
+    bool active = false;        ///< some row pushed
+    bool infeasible = false;    ///< a pair or a joint limit is missed by more than it can afford
+    bool torque_bound = false;  ///< a torque limit pushed
   };
-  /// min 1/2 (a - a0)^T M (a - a0)  subject to, with g the barrier gain,
-  ///   pairs:          hdd + 2 g hd + g^2 h >= 0,  h = d - dmin
-  ///   joints:         the same with the distance to each limit near enough, and |qd| within the velocity
-  ///   limit
-  /// exactly, by an active-set method in x = L^T (a - a0), M = L L^T.  @param a  in: a0, out: the minimiser;
-  /// where infeasible: what meets the rows that can be met together, the cheapest first
-  Outcome solve(const Arm& arm, Pairs& pairs, Eigen::VectorXd& a) noexcept;
+  /// min 1/2 (a - a0)^T M (a - a0) + the price of what is missed, subject to, with g the barrier gain (at
+  /// most 1/4 over dt),
+  ///   pairs:         hdd + 2 g hd + g^2 h >= 0,  h = d - dmin
+  ///   joint limits:  the same with the distance to each limit near enough
+  ///   |qd|, |qdd|, |M a + c + gravity| within the robot's limits of velocity, acceleration and torque
+  /// by an active-set method in x = L^T (a - a0), M = L L^T.  Rows that contradict each other share the miss
+  /// by their price: what is physical (torque, joint limits) before distance, distance before what a
+  /// controller asks for (velocity, acceleration).
+  /// @param a  in: a0, out: the minimiser
+  Outcome solve(const Arm& arm, Pairs& pairs, double dt_s, Eigen::VectorXd& a) noexcept;
 
  private:
-  void add_row(const Arm& arm, double b, double least_mobility) noexcept;
+  void add_row(const Arm& arm, double b, double price) noexcept;
   void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
-  void add_joint_rows(const Arm& arm) noexcept;
+  void add_joint_rows(const Arm& arm, double dt_s) noexcept;
+  void add_torque_rows(const Arm& arm) noexcept;
 
   const scene::PlannerOptions& options_;
   LeastNorm least_norm_;
   Eigen::MatrixXd A_, C_;  ///< a row's coefficients as a column; L^-1 times it, to length 1
-  Eigen::VectorXd b_, s_, length_, x_;
+  Eigen::VectorXd b_, s_, length_, give_, x_;
   std::vector<std::size_t> pair_of_row_;
-  Eigen::Index rows_ = 0;
+  double gain_ = 0;  ///< of this cycle [1/s]
+  Eigen::Index rows_ = 0, hard_rows_ = 0, torque_row_ = 0;
 };
 
 }  // namespace hamel::planner

@@ -106,7 +106,9 @@ void Gyro::add_powerless(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& ta
     const Vector3d mapped = joint_rotation(mapping_, pair.Lam, w);
     pair.gyroscopic = mapped.cross(relative ? pair.v_relative : pair.v);
     add_gyroscopic(mapped, pairs.J(k), G_);
-    if (relative) tau_moving_.noalias() -= pairs.J(k).transpose().lazyProduct(mapped.cross(pair.v_obstacle));
+    if (relative)
+      tau_moving_.noalias() -=
+          pairs.J(k).transpose().lazyProduct(Vector3d(pair.Lam * w.cross(pair.v_obstacle)));
   }
   if (!any) return;
   tau += tau_moving_;
@@ -147,9 +149,10 @@ bool Gyro::add_circulation(Pairs& pairs, Memory& memory, double t_s, double kc, 
     const double strength = kc * smooth_step(1 - pair.d / options_.rho0_m) * press;
     pair.repulsive = pair.Lam * (strength * vector(turn->axis).cross(pair.n));
     tau_gyro_.noalias() = pairs.J(k).transpose().lazyProduct(pair.repulsive);
-    injected_power_ += pair.repulsive.dot(pair.v);
+    circulation_power_ += pair.repulsive.dot(pair.v);
     tau += tau_gyro_;
   }
+  injected_power_ += circulation_power_;
   return pressed;
 }
 

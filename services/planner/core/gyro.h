@@ -36,7 +36,8 @@ class Gyro {
   double gyroscopic_power_W() const noexcept { return gyroscopic_power_; }
   /// By moving obstacles and circulation.
   double injected_power_W() const noexcept { return injected_power_; }
-  void clear_power() noexcept { gyroscopic_power_ = injected_power_ = 0; }
+  double circulation_power_W() const noexcept { return circulation_power_; }
+  void clear_power() noexcept { gyroscopic_power_ = injected_power_ = circulation_power_ = 0; }
 
  private:
   Eigen::Vector3d preferred_axis(const Pair& pair, const Eigen::Vector3d& g,
@@ -52,7 +53,7 @@ class Gyro {
   Eigen::MatrixXd G_, M_minus_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
   Eigen::VectorXd dqd_, v_mid_, tau_gyro_, tau_moving_;
-  double gyroscopic_power_ = 0, injected_power_ = 0;
+  double gyroscopic_power_ = 0, injected_power_ = 0, circulation_power_ = 0;
 };
 
 /// The common direction of all joint axes in the world where a chain is planar (revolute, all parallel); else

@@ -10,8 +10,10 @@
 
 namespace hamel::planner {
 
-inline constexpr std::size_t kMaxPairs = 256;  ///< pairs of (link shape, obstacle) acted on in one cycle
-inline constexpr std::size_t kMaxTurns = 64;   ///< obstacles whose circulation direction is held
+inline constexpr std::size_t kMaxPairs = 256;      ///< pairs of (link shape, obstacle) acted on in one cycle
+inline constexpr std::size_t kMaxTurns = 64;       ///< obstacles whose circulation direction is held
+inline constexpr std::size_t kMaxSightings = 128;  ///< obstacles of unknown velocity that are watched
+inline constexpr std::size_t kMaxWaypoint = 64;    ///< joints of a waypoint
 
 using Triple = std::array<double, 3>;
 
@@ -28,6 +30,24 @@ struct HeldTurn {
   std::uint64_t obstacle = 0;  ///< the key; the table is sorted by it
   double seen_s = 0;
   Triple axis{};
+};
+
+/// Where an obstacle of unknown velocity was last seen, and how fast it seems to move.
+struct Sighting {
+  std::uint64_t obstacle = 0;  ///< the key
+  double stamp_s = 0;
+  Triple at{}, velocity{};
+  std::uint64_t known = 0;  ///< 1: seen twice, `velocity` is an estimate
+};
+
+/// A configuration to pass on the way to the goal.
+struct Waypoint {
+  std::uint64_t set = 0;         ///< 1: on the way to it
+  std::uint64_t asked = 0;       ///< questions asked at this goal so far
+  std::uint64_t asked_step = 0;  ///< of the last question
+  std::uint64_t waiting = 0;     ///< 1: the last question has no answer yet
+  double since_s = 0;            ///< on the way since
+  std::array<double, kMaxWaypoint> q{};
 };
 
 /// Copy it, save it, load it.  Every field is eight bytes wide: there is no padding to differ.
@@ -55,11 +75,17 @@ struct Memory {
   double infeasible_s = -std::numeric_limits<double>::infinity();  ///< when the barrier last gave up
   double ramp_start_s = -1;                                        ///< < 0: no ramp
   std::uint64_t ramp_asked = 0;                                    ///< 1: starts with the next cycle
+  double tank_J = 0,
+         tank_full_J = -1;  ///< what circulation may still spend, and at the start; < 0: not yet set
   std::uint64_t held_count = 0, turn_count = 0;
   std::array<HeldPair, kMaxPairs> held{};
   std::array<HeldTurn, kMaxTurns> turns{};
+  std::uint64_t sighting_count = 0;
+  std::array<Sighting, kMaxSightings> sightings{};
+  Waypoint waypoint;
 };
 static_assert(std::is_trivially_copyable_v<Memory>);
 static_assert(sizeof(HeldPair) == 9 * 8 && sizeof(HeldTurn) == 5 * 8);
+static_assert(sizeof(Sighting) == 9 * 8 && sizeof(Waypoint) == (5 + kMaxWaypoint) * 8);
 
 }  // namespace hamel::planner

@@ -1,5 +1,7 @@
 #include "services/planner/core/monitor.h"
 
+#include <limits>
+
 namespace hamel::planner {
 namespace {
 
@@ -23,12 +25,21 @@ Verdict stuck(const Progress& now, bool moving) {
 
 }  // namespace
 
+void restart_progress(Memory& m, double t_s) noexcept {
+  m.progress_s = m.turn_s = m.fast_s = t_s;
+  m.best_error = m.turn_error = std::numeric_limits<double>::max();
+  m.flips = 0;
+}
+
 void start_goal(Memory& m, double t_s) noexcept {
   m.goal_started = 1;
   m.goal_start_s = m.progress_s = m.turn_s = m.fast_s = t_s;
   m.within_since_s = m.time_to_goal_s = -1;
   m.best_error = m.turn_error = 0;  // set by the first judgement
   m.flips = 0;
+  m.waypoint = {};
+  m.tank_J = 0;
+  m.tank_full_J = -1;
   m.held_count = m.turn_count = 0;
   m.held.fill({});
   m.turns.fill({});
@@ -64,7 +75,8 @@ Verdict judge(const scene::PlannerOptions& o, Memory& m, const Progress& now) no
     if (reason != Reason::unreachable) return stuck(now, !stands);
   }
   if (idle_s >= o.progress_window_s && stands && !now.escaping) return stuck(now, false);
-  if (idle_s >= kOrbitWindows * o.progress_window_s && !now.escaping) return stuck(now, true);
+  const double windows = now.has_rollouts ? 1 : kOrbitWindows;
+  if (idle_s >= windows * o.progress_window_s && !now.escaping) return stuck(now, true);
   return {State::moving, Reason::none, "on its way"};
 }
 

@@ -22,11 +22,14 @@ struct Progress {
   bool out_of_reach = false;
   bool target_blocked = false;  ///< an obstacle lies over the target
   bool at_joint_limit = false;  ///< the attraction presses a joint against its limit
-  bool escaping = false;        ///< circulation still has a side to try
+  bool escaping = false;        ///< circulation still has a side to try, or the arm passes a waypoint
+  bool has_rollouts = false;    ///< a way out can be asked for: no need to wait long
 };
 
 /// Forgets everything that belonged to the goal before.
 void start_goal(Memory& memory, double t_s) noexcept;
+/// The clocks of progress begin anew: the arm was sent elsewhere for a while.
+void restart_progress(Memory& memory, double t_s) noexcept;
 /// IDLE, MOVING, REACHED or STUCK, from what the memory knows; keeps the clocks.
 ///   REACHED  within tolerance and slow for goal_hold_s; left beyond twice the tolerance
 ///   STUCK    slow and the error has not fallen 10 % in progress_window_s; four windows without progress

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kFastest_mps = 10;  // an obstacle of unknown velocity, for what may come into reach
+constexpr double kFastest_mps = 10;  // of an obstacle that does not say; a faster jump is a wrong sample
 
 bool usable(const geometry::Obstacle& o) {
   const bool finite = o.X_WO.p.allFinite() && o.X_WO.R.allFinite() && o.shape.dims_m.allFinite() &&
@@ -26,6 +26,44 @@ void move(geometry::Obstacle& o, double age_s) {
   const Vector3d turn = age_s * o.V_WO.head<3>();
   const double angle = turn.norm();
   if (angle > 1e-12) o.X_WO.R = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * o.X_WO.R;
+}
+
+constexpr double kForget_s = 1;  // a gap after which an obstacle counts as new
+
+// The table's entry of an obstacle, a new one, or null where the table is full of fresher ones.
+Sighting* sighting(Memory& m, std::uint32_t id, double stamp_s) {
+  const auto end = m.sightings.begin() + static_cast<std::ptrdiff_t>(m.sighting_count);
+  const auto it = std::find_if(m.sightings.begin(), end, [&](const Sighting& s) { return s.obstacle == id; });
+  if (it != end) return &*it;
+  Sighting* free = nullptr;
+  if (m.sighting_count < m.sightings.size())
+    free = &m.sightings[m.sighting_count++];
+  else
+    for (Sighting& s : m.sightings)
+      if (std::abs(stamp_s - s.stamp_s) > kForget_s) free = &s;
+  if (free) *free = Sighting{id, stamp_s, {}, {}, 2};  // 2: seen by nobody yet
+  return free;
+}
+
+// The velocity of an obstacle that does not tell it; false: not known yet.
+bool estimate(Memory& m, const geometry::Obstacle& o, double stamp_s, Vector3d& velocity) {
+  Sighting* s = sighting(m, o.id, stamp_s);
+  if (!s) return false;
+  const double passed_s = stamp_s - s->stamp_s;
+  const Vector3d at(s->at[0], s->at[1], s->at[2]), before(s->velocity[0], s->velocity[1], s->velocity[2]);
+  if (s->known != 2 && std::abs(passed_s) < 1e-9) {
+    velocity = before;
+    return s->known == 1;
+  }
+  const Vector3d now = (o.X_WO.p - at) / passed_s;
+  const bool trusted = s->known != 2 && passed_s > 0 && passed_s < kForget_s && now.norm() < kFastest_mps;
+  velocity = trusted ? s->known == 1 ? Vector3d(0.5 * (before + now)) : now : Vector3d::Zero();
+  *s = Sighting{o.id,
+                stamp_s,
+                {o.X_WO.p[0], o.X_WO.p[1], o.X_WO.p[2]},
+                {velocity[0], velocity[1], velocity[2]},
+                trusted ? 1u : 0u};
+  return trusted;
 }
 
 }  // namespace
@@ -80,20 +118,28 @@ void Obstacles::sift(std::span<const geometry::Obstacle> stamped, const scene::P
   if (!std::is_sorted(near_.begin(), near_.end(), before)) std::sort(near_.begin(), near_.end(), before);
 }
 
-void Obstacles::take(std::span<const geometry::Obstacle> stamped, double age_s,
-                     const scene::PlannerOptions& o, std::uint64_t set) noexcept {
+void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, double age_s,
+                     const scene::PlannerOptions& o, Memory& memory, std::uint64_t set) noexcept {
   const bool known = set != 0 && set == set_ && stamped.size() == set_size_;
   if (!known) sift(stamped, o);
   set_ = set;
   set_size_ = stamped.size();
   items_.clear();
+  estimated_ = unknown_ = 0;
   const double age = std::isfinite(age_s) ? std::max(age_s, 0.0) : 0.0;
   for (const std::size_t k : near_) {
     const geometry::Obstacle& s = stamped[k];
     Item item{s, {}, 2 * std::max(s.sigma_m, 0.0), k};
     if (!s.velocity_known) {
       item.now.V_WO.setZero();
-      item.inflation_m += o.assumed_speed_mps * age;
+      Vector3d velocity;
+      if (estimate(memory, s, t_s - age, velocity)) {
+        item.now.V_WO.tail<3>() = velocity;
+        ++estimated_;
+      } else {
+        item.inflation_m += o.assumed_speed_mps * age;
+        ++unknown_;
+      }
     }
     move(item.now, age);
     item.solid = geometry::solid(item.now.shape, item.now.X_WO);
@@ -130,6 +176,7 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
 void Pairs::clear() noexcept {
   count_ = self_count_ = 0;
   dropped_ = 0;
+  base_touched_ = false;
   clearance_m_ = self_clearance_m_ = std::numeric_limits<double>::infinity();
   for (Nearest& n : nearest_) n = Nearest{};
 }
@@ -182,7 +229,9 @@ void Pairs::touch_base(const Body& base, const Obstacles& obstacles) noexcept {
     const bool stands = item.now.velocity_known && item.now.V_WO.isZero(0);
     if (stands || geometry::distance_bound(base.solid_W, item.solid) > 0) continue;
     const double d = geometry::closest(base.solid_W, item.solid).distance_m;
-    if (d < 0) clearance_m_ = std::min(clearance_m_, d);
+    if (!(d < 0)) continue;
+    base_touched_ = true;
+    clearance_m_ = std::min(clearance_m_, d);
   }
 }
 

@@ -31,11 +31,13 @@ class Obstacles {
   static constexpr std::size_t kMost = 4096;
   static constexpr double kSeen_m = 0.5;
   explicit Obstacles(const Workspace& workspace = {{}, scene::kInf});
-  /// Takes a set `age_s` old.  A moving obstacle goes on with its twist; one of unknown velocity stays and
-  /// grows.  @param set  a number that changes with the set; while it stays (not 0), obstacles that were out
-  /// of reach are not looked at again
-  void take(std::span<const geometry::Obstacle> stamped, double age_s, const scene::PlannerOptions& o,
-            std::uint64_t set = 0) noexcept;
+  /// Takes a set `age_s` old at time t_s.  A moving obstacle goes on with its twist.  One of unknown velocity
+  /// is watched: from its second set on it goes on with the velocity between the last two (the mean of that
+  /// and the one before), until then, or where none can be made out, it stays and grows.
+  /// @param set  a number that changes with the set; while it stays (not 0), obstacles that were out of reach
+  ///             are not looked at again
+  void take(std::span<const geometry::Obstacle> stamped, double t_s, double age_s,
+            const scene::PlannerOptions& o, Memory& memory, std::uint64_t set = 0) noexcept;
 
   struct Item {
     geometry::Obstacle now;
@@ -44,6 +46,8 @@ class Obstacles {
     std::size_t order = 0;    ///< in the input
   };
   std::span<const Item> items() const noexcept { return items_; }
+  int velocities_estimated() const noexcept { return estimated_; }
+  int velocities_unknown() const noexcept { return unknown_; }
   bool all_finite() const noexcept { return all_finite_; }
   bool too_many() const noexcept { return too_many_; }
 
@@ -56,6 +60,7 @@ class Obstacles {
   std::vector<std::size_t> near_;  ///< of the set, in order of ids
   std::uint64_t set_ = 0;
   std::size_t set_size_ = 0;
+  int estimated_ = 0, unknown_ = 0;
   bool all_finite_ = true, too_many_ = false;
 };
 
@@ -114,6 +119,8 @@ class Pairs {
   };
   std::span<const Nearest> nearest() const noexcept { return nearest_; }
   double clearance_m() const noexcept { return clearance_m_; }
+  /// A moving obstacle is in the base, which no motion of the arm can prevent.
+  bool base_touched() const noexcept { return base_touched_; }
   /// Smallest distance of two links that must not touch; +inf where none are within range.
   double self_clearance_m() const noexcept { return self_clearance_m_; }
   int dropped() const noexcept { return dropped_; }
@@ -146,6 +153,7 @@ class Pairs {
   Eigen::Index n_ = 0;
   Eigen::MatrixXd J_, MJ_, J_other_;  ///< all Jacobians side by side; M^-1 J^T of one; the other link's
   double clearance_m_ = 0, self_clearance_m_ = 0, tip_radius_m_ = 0;
+  bool base_touched_ = false;
   int dropped_ = 0, shapes_ = 0;  ///< shapes_: bodies that are not the base's
 };
 

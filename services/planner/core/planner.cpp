@@ -1,19 +1,20 @@
 #include "services/planner/core/planner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
 #include "services/planner/core/arm.h"
 #include "services/planner/core/attraction.h"
 #include "services/planner/core/barrier.h"
+#include "services/planner/core/escape.h"
 #include "services/planner/core/force_law.h"
 #include "services/planner/core/gyro.h"
 #include "services/planner/core/holds.h"
 #include "services/planner/core/monitor.h"
 #include "services/planner/core/pairs.h"
 #include "services/planner/core/reachable.h"
+#include "services/planner/core/report.h"
 
 namespace hamel::planner {
 
@@ -26,6 +27,7 @@ namespace {
 constexpr std::uint64_t kFlips = 2;  // sides tried before an arm that circulates is called stuck
 constexpr double kFade_s = 0.5;      // circulation comes back over it after the barrier was infeasible
 constexpr double kLeastPeriod_s = 1e-6;
+constexpr double kNearWaypoint = 0.15, kWaypoint_s = 4;  // a waypoint is passed [rad or m], or given up
 
 }  // namespace
 
@@ -42,6 +44,8 @@ struct Planner::Impl {
         qdd_att(tau_att),
         qdd(tau_att),
         scratch(kMaxPairs) {
+    waypoint.kind = scene::GoalKind::joints;
+    waypoint.joints = tau_att;
     if (options.method == Method::gyro &&
         options.barrier_gain > 0)  // the barrier must see an obstacle in time
       options.vmax_mps = std::min(options.vmax_mps, options.barrier_gain * options.rho0_m);
@@ -51,11 +55,11 @@ struct Planner::Impl {
   void prepare(const Input& in) noexcept;
   Verdict move(const Input& in, VectorXd& tau) noexcept;
   void steer(const Input& in, bool unreachable, VectorXd& tau) noexcept;
-  void circulate(double t_s, VectorXd& tau) noexcept;
-  bool guard(VectorXd& tau) noexcept;
+  void circulate(const Input& in, VectorXd& tau) noexcept;
+  double open_tank(double dt_s) noexcept;
+  bool guard(const Input& in, VectorXd& tau) noexcept;
   void brake(double dt_s, VectorXd& tau) const noexcept;
   void report(const Verdict& verdict, Report& out) noexcept;
-  void report_links(Report& out) const noexcept;
   double slow_down(const Input& in) const noexcept;
   void look_for_a_way(const scene::Goal& wanted);
   Verdict approached(Verdict verdict) noexcept;
@@ -64,6 +68,8 @@ struct Planner::Impl {
   }
   bool target_blocked() const noexcept;
   void remember_tip() noexcept;
+  bool pass_waypoint(const Input& in) noexcept;
+  bool ask_for_escape(const Input& in, const Verdict& verdict) noexcept;
 
   Options options;
   Arm arm;
@@ -75,9 +81,12 @@ struct Planner::Impl {
   Barrier::Outcome outcome;
   VectorXd tau_att, qdd_att, qdd;
   std::vector<HeldPair> scratch;
-  scene::Goal goal, asked;               // `asked` as it came
+  scene::Goal goal, sought;              // `sought` as it came
+  scene::Goal waypoint;                  // as a goal
   Vector3d beyond_W = Vector3d::Zero();  // from where the arm is sent to a target out of reach
-  bool has_goal = false, goal_fits = true, goal_reachable = true, looked = false;
+  bool has_goal = false, goal_fits = true, goal_reachable = true, looked = false, asked = false;
+  GoalError goal_error;
+  Vector3d target_W = Vector3d::Zero();
   double tip_speed = 0;
   Memory memory;
 };
@@ -109,8 +118,8 @@ void Planner::set_goal(const scene::Goal& goal) {
 
 // Whether the arm can meet the goal at all, and where to send it if not.
 void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
-  const bool same = wanted.id == memory.goal_id && wanted.kind == asked.kind &&
-                    wanted.X_WG.p == asked.X_WG.p && wanted.X_WG.R == asked.X_WG.R;
+  const bool same = wanted.id == memory.goal_id && wanted.kind == sought.kind &&
+                    wanted.X_WG.p == sought.X_WG.p && wanted.X_WG.R == sought.X_WG.R;
   if (!goal_fits || wanted.kind == scene::GoalKind::joints) {
     goal_reachable = true;
     beyond_W.setZero();
@@ -120,7 +129,7 @@ void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
     beyond_W = found.reachable ? Vector3d(Vector3d::Zero()) : Vector3d(wanted.X_WG.p - found.nearest_W);
     looked = true;
   }
-  asked = wanted;
+  sought = wanted;
   if (!goal_reachable && options.unreachable == scene::Unreachable::approach) goal.X_WG.p -= beyond_W;
 }
 
@@ -130,6 +139,35 @@ void Planner::clear_goal() {
 }
 
 void Planner::ramp_in() noexcept { impl_->memory.ramp_asked = 1; }
+
+EscapeQuestion Planner::escape_question(const Input& in) const {
+  const Impl& p = *impl_;
+  const double goal_age_s = in.t_s - p.memory.goal_start_s;
+  EscapeQuestion question{in.step,           in.q,   in.qd,      {},
+                          in.obstacle_age_s, p.goal, goal_age_s, p.memory.waypoint.asked};
+  // As the planner sees them: of unknown velocity goes on with the estimated one.
+  for (const Obstacles::Item& item : p.obstacles.items()) {
+    question.obstacles.push_back(item.now);
+    question.obstacles.back().velocity_known = true;
+  }
+  question.obstacle_age_s = 0;
+  return question;
+}
+
+std::uint64_t Planner::escape_steps(double dt_step_s) const noexcept {
+  return static_cast<std::uint64_t>(std::ceil(impl_->options.escape_delay_s / dt_step_s));
+}
+
+void Planner::take_escape(const VectorXd& waypoint, double t_s) noexcept {
+  Impl& p = *impl_;
+  Waypoint& w = p.memory.waypoint;
+  w.waiting = 0;
+  if (waypoint.size() != p.arm.n() || waypoint.size() > static_cast<Eigen::Index>(kMaxWaypoint)) return;
+  w.set = 1;
+  w.since_s = t_s;
+  std::copy_n(waypoint.data(), waypoint.size(), w.q.begin());
+}
+
 const Memory& Planner::memory() const noexcept { return impl_->memory; }
 void Planner::restore(const Memory& memory) noexcept { impl_->memory = memory; }
 
@@ -155,6 +193,7 @@ void Planner::plan(const Input& in, Output& out) noexcept {
 // Takes the input in and says why the arm may not move, or MOVING.
 Verdict Planner::Impl::see(const Input& in) noexcept {
   gyro.clear_power();
+  asked = false;
   outcome = {};
   pairs.clear();
   if (in.q.size() != arm.n() || in.qd.size() != arm.n()) {
@@ -167,7 +206,7 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
   }
   arm.look(in.q, in.qd);
   remember_tip();
-  obstacles.take(in.obstacles, in.obstacle_age_s, options, in.obstacle_set);
+  obstacles.take(in.obstacles, in.t_s, in.obstacle_age_s, options, memory, in.obstacle_set);
   pairs.find(arm, obstacles);
   memory.clearance_min_m = std::min(memory.clearance_min_m, pairs.clearance_m());
   const bool self_contact = pairs.self_clearance_m() < 0;
@@ -181,6 +220,8 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
   if (has_goal && !goal_fits) return {State::fault, Reason::configuration, "the goal does not fit the robot"};
   if (obstacles.too_many()) return {State::fault, Reason::internal, "more obstacles than the planner holds"};
   if (self_contact) return {State::unsafe, Reason::contact, "two links touch"};
+  if (pairs.base_touched())
+    return {State::unsafe, Reason::contact, "an obstacle has come to the base, which cannot give way"};
   if (contact) return {State::unsafe, Reason::contact, "a link touches an obstacle"};
   if (was_contact && std::min(pairs.clearance_m(), pairs.self_clearance_m()) < options.dmin_m)
     return {State::unsafe, Reason::contact, "a link has touched something and is still too near"};
@@ -219,6 +260,8 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
   if (steered) {
     if (!memory.goal_started) start_goal(memory, in.t_s);
     attraction.update(arm, goal, in.t_s - memory.goal_start_s, slow_down(in));
+    goal_error = attraction.error();
+    target_W = attraction.target_W();
     Progress now;
     now.t_s = in.t_s;
     now.scaled_error = attraction.error().scaled;
@@ -230,14 +273,22 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
                      (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
     now.target_blocked = !joints && target_blocked();
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
+    const bool rollouts = options.method == Method::gyro && options.escapes > 0;
+    const std::uint64_t flips = rollouts ? 1 : kFlips;
     now.escaping =
-        options.method == Method::gyro && options.kc > 0 && memory.turn_count > 0 && memory.flips < kFlips;
-    verdict = judge(options, memory, now);
-    if (approaching()) verdict = approached(verdict);
+        options.method == Method::gyro && options.kc > 0 && memory.turn_count > 0 && memory.flips < flips;
+    now.has_rollouts = rollouts;
+    if (!pass_waypoint(in))
+      verdict = approaching() ? approached(judge(options, memory, now)) : judge(options, memory, now);
+    else
+      verdict = {State::moving, Reason::none, "escaping by way of a waypoint that rollouts found"};
+    asked = ask_for_escape(in, verdict);
   }
   steer(in, verdict.reason == Reason::unreachable && !approaching(), tau);
-  if (options.method == Method::gyro && guard(tau)) {
+  if (options.method == Method::gyro && guard(in, tau)) {
     memory.infeasible_s = in.t_s;
+    if (outcome.torque_bound)
+      return {State::unsafe, Reason::torque_limit, "the joints are too weak to keep all distances: braking"};
     return {State::unsafe, Reason::infeasible, "no acceleration keeps all distances: braking"};
   }
   return verdict;
@@ -249,6 +300,37 @@ Verdict Planner::Impl::approached(Verdict verdict) noexcept {
   if (verdict.state == State::reached || verdict.state == State::stuck)
     return {State::stuck, Reason::unreachable, "as near as the arm comes to a target out of reach"};
   return verdict;
+}
+
+// While a waypoint is set the arm is drawn to it instead of the goal: until near it, or for no longer than
+// kWaypoint_s.
+bool Planner::Impl::pass_waypoint(const Input& in) noexcept {
+  Waypoint& w = memory.waypoint;
+  if (!w.set) return false;
+  std::copy_n(w.q.begin(), arm.n(), waypoint.joints.begin());
+  const bool near = (waypoint.joints - arm.q).lpNorm<Eigen::Infinity>() < kNearWaypoint;
+  if (near || in.t_s - w.since_s > kWaypoint_s || in.t_s < w.since_s) {
+    w.set = 0;
+    restart_progress(memory, in.t_s);
+    return false;
+  }
+  attraction.update(arm, waypoint, 0, slow_down(in));
+  return true;
+}
+
+// Where only another way helps, and there are questions left.
+bool Planner::Impl::ask_for_escape(const Input& in, const Verdict& verdict) noexcept {
+  Waypoint& w = memory.waypoint;
+  const bool curable = verdict.reason == Reason::local_minimum || verdict.reason == Reason::joint_limit ||
+                       verdict.reason == Reason::orbit;
+  const bool ask = options.method == Method::gyro && verdict.state == State::stuck && curable && !w.waiting &&
+                   w.asked < static_cast<std::uint64_t>(options.escapes) &&
+                   arm.n() <= static_cast<int>(kMaxWaypoint);
+  if (!ask) return false;
+  w.waiting = 1;
+  ++w.asked;
+  w.asked_step = in.step;
+  return true;
 }
 
 // tau = attraction - bj M qd + forces of the obstacles.
@@ -275,18 +357,31 @@ void Planner::Impl::steer(const Input& in, bool unreachable, VectorXd& tau) noex
   }
   if (options.method == Method::gyro) {
     gyro.choose_axes(pairs, memory, in.t_s, qdd_att);
-    circulate(in.t_s, tau);
+    circulate(in, tau);
     remember_pairs(memory, pairs.items(), in.t_s, scratch);
   }
   if (options.method == Method::gyro || options.method == Method::gyro_paper)
     gyro.add(arm, pairs, in.dt_s, tau);
 }
 
+// Circulation is not powerless: it spends from a tank that holds the pull's energy at the start and is filled
+// by what damping takes out.  1: open; it closes smoothly over the last tenth.
+double Planner::Impl::open_tank(double dt_s) noexcept {
+  if (memory.tank_full_J < 0) memory.tank_J = memory.tank_full_J = attraction.potential_J();
+  qdd.noalias() = arm.M * arm.qd;
+  memory.tank_J =
+      std::clamp(memory.tank_J + dt_s * options.damping * arm.qd.dot(qdd), 0.0, memory.tank_full_J);
+  return memory.tank_full_J > 0 ? smooth_step(10 * memory.tank_J / memory.tank_full_J) : 0;
+}
+
 // Held-direction circulation with its flip timer; 1.8.
-void Planner::Impl::circulate(double t_s, VectorXd& tau) noexcept {
+void Planner::Impl::circulate(const Input& in, VectorXd& tau) noexcept {
+  const double t_s = in.t_s;
   if (!(options.kc > 0) || !has_goal) return;
   const double fade = std::clamp((t_s - memory.infeasible_s) / kFade_s, 0.0, 1.0);
-  const bool pressed = gyro.add_circulation(pairs, memory, t_s, fade * options.kc, qdd_att, tau);
+  const double kc = fade * open_tank(in.dt_s) * options.kc;
+  const bool pressed = gyro.add_circulation(pairs, memory, t_s, kc, qdd_att, tau);
+  memory.tank_J -= std::max(gyro.circulation_power_W(), 0.0) * in.dt_s;
   const double error = attraction.error().scaled;
   if (pressed) memory.pressed_s = t_s;
   const bool clear = t_s - memory.pressed_s > kTurnHold_s;
@@ -304,14 +399,14 @@ void Planner::Impl::circulate(double t_s, VectorXd& tau) noexcept {
 }
 
 // The barrier over the wanted torque; true where it had to give up and brakes.
-bool Planner::Impl::guard(VectorXd& tau) noexcept {
+bool Planner::Impl::guard(const Input& in, VectorXd& tau) noexcept {
   if (!(options.barrier_gain > 0)) return false;
   qdd = tau - arm.coriolis;
   arm.M_llt.solveInPlace(qdd);
-  outcome = barrier.solve(arm, pairs, qdd);
+  outcome = barrier.solve(arm, pairs, in.dt_s, qdd);
   if (outcome.infeasible) {
     qdd = -options.brake_rate * arm.qd;
-    (void)barrier.solve(arm, pairs, qdd);
+    (void)barrier.solve(arm, pairs, in.dt_s, qdd);
   }
   if (outcome.active || outcome.infeasible) tau.noalias() = arm.coriolis + arm.M * qdd;
   return outcome.infeasible;
@@ -358,12 +453,11 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.end_effector_m = vector(memory.tip_m);
   out.goal_id = has_goal ? goal.id : 0;
   const bool joints = goal.kind == scene::GoalKind::joints;
-  out.target_error_m =
-      !has_goal ? 0
-      : joints  ? attraction.error().position_m
-               : (attraction.target_W() + (approaching() ? beyond_W : Vector3d(0, 0, 0)) - out.end_effector_m)
-                     .norm();
-  out.orientation_error_rad = has_goal ? attraction.error().angle_rad : 0;
+  const Vector3d rest = approaching() ? beyond_W : Vector3d(0, 0, 0);
+  out.target_error_m = !has_goal ? 0
+                       : joints  ? goal_error.position_m
+                                 : (target_W + rest - out.end_effector_m).norm();
+  out.orientation_error_rad = has_goal ? goal_error.angle_rad : 0;
   out.clearance_m = pairs.clearance_m();
   out.clearance_min_m = memory.clearance_min_m;
   out.contacts = memory.contacts;
@@ -371,49 +465,19 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.time_to_goal_s = memory.time_to_goal_s;
   out.gyroscopic_power_W = gyro.gyroscopic_power_W();
   out.injected_power_W = gyro.injected_power_W();
+  out.kinetic_J = arm.q.allFinite() ? 0.5 * arm.qd.dot(arm.M.lazyProduct(arm.qd)) : 0;
+  out.attraction_J = has_goal ? attraction.potential_J() : 0;
+  out.tank_J = memory.tank_J;
   out.pairs_in_range = static_cast<int>(pairs.items().size());
   out.pairs_dropped = pairs.dropped();
+  out.velocities_estimated = obstacles.velocities_estimated();
+  out.velocities_unknown = obstacles.velocities_unknown();
+  out.escape_asked = asked;
+  out.escape_waiting = memory.waypoint.waiting != 0;
+  out.escapes = memory.waypoint.asked;
   out.barrier_rows = outcome.rows;
   out.barrier_steps = outcome.steps;
-  report_links(out);
-}
-
-void Planner::Impl::report_links(Report& out) const noexcept {
-  out.links.resize(pairs.nearest().size());
-  for (std::size_t i = 0; i < out.links.size(); ++i) {
-    LinkReport& link = out.links[i];
-    link = LinkReport{};
-    link.link = static_cast<std::uint32_t>(i);
-    const Pairs::Nearest& nearest = pairs.nearest()[i];
-    if (!nearest.item) continue;
-    link.obstacle = nearest.item->now.id;
-    link.distance_m = nearest.at.distance_m;
-    link.point_on_link_m = nearest.at.on_link;
-    link.point_on_obstacle_m = nearest.at.on_obstacle;
-  }
-  for (const Pair& pair : pairs.items()) {
-    LinkReport& link = out.links[static_cast<std::size_t>(pair.link)];
-    const Pairs::Nearest& nearest = pairs.nearest()[static_cast<std::size_t>(pair.link)];
-    if (pair.item != nearest.item || pair.shape != nearest.shape) continue;
-    link.closing_speed_mps = pair.n.dot(pair.v_relative);
-    link.phi_rad = approach_angle(pair.n, pair.v_relative);
-    link.gyroscopic_N = pair.gyroscopic;
-    link.repulsive_N = pair.repulsive;
-    link.barrier_multiplier = pair.multiplier;
-  }
-}
-
-const char* to_string(State v) noexcept {
-  static constexpr std::array names{"IDLE", "MOVING", "REACHED", "STUCK", "UNSAFE", "FAULT"};
-  return names[static_cast<std::size_t>(v)];
-}
-
-const char* to_string(Reason v) noexcept {
-  static constexpr std::array names{"none",        "local_minimum", "joint_limit", "goal_blocked",
-                                    "unreachable", "orbit",         "contact",     "stale_obstacles",
-                                    "stale_state", "infeasible",    "non_finite",  "torque_limit",
-                                    "driver",      "configuration", "internal"};
-  return names[static_cast<std::size_t>(v)];
+  report_links(pairs, out);
 }
 
 }  // namespace hamel::planner

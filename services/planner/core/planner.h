@@ -91,10 +91,17 @@ struct Report {
   double time_to_goal_s = -1;                                        ///< < 0: not reached yet
   double gyroscopic_power_W = 0;            ///< 0 but for rounding where the mapping is powerless
   double injected_power_W = 0;              ///< by moving obstacles and circulation
+  double kinetic_J = 0, attraction_J = 0;   ///< of the arm; of the pull, kp/2 e^T Lam e
+  double tank_J = 0;                        ///< what circulation may still spend
   int pairs_in_range = 0;                   ///< (link shape, obstacle) pairs acted on
   int pairs_dropped = 0;                    ///< in range but beyond kMaxPairs: the farthest ones
   int barrier_rows = 0, barrier_steps = 0;  ///< rows seen, steps of its active set
-  std::vector<LinkReport> links;            ///< n, from base to tip
+  int velocities_estimated = 0, velocities_unknown = 0;  ///< obstacles that do not tell theirs
+  /// Stuck, and a way out may be found: ask find_escape() about this cycle's input with this many tries and
+  /// tell take_escape() what it says.  Asked once; then `escape_waiting` until it is told.
+  bool escape_asked = false, escape_waiting = false;
+  std::uint64_t escapes = 0;      ///< questions so far at this goal
+  std::vector<LinkReport> links;  ///< n, from base to tip
 };
 
 /// What one cycle writes.  Make it with Planner::output() so that plan() has nothing to allocate.
@@ -102,6 +109,8 @@ struct Output {
   Eigen::VectorXd torque_Nm;
   Report report;
 };
+
+struct EscapeQuestion;
 
 /// A planner bound to one robot and one set of options.  Not for two threads at once.
 class Planner {
@@ -121,6 +130,12 @@ class Planner {
   void clear_goal();
   /// After a restart that lost its memory: the attraction ramps in over `ramp_s`, starting with a hold.
   void ramp_in() noexcept;
+  /// What report.escape_asked asks, of the cycle just planned; the answer is due `escape_steps` steps after
+  /// that cycle's.  Allocates.
+  EscapeQuestion escape_question(const Input& input) const;
+  std::uint64_t escape_steps(double dt_step_s) const noexcept;
+  /// The answer to report.escape_asked: by way of this configuration, or none (empty).
+  void take_escape(const Eigen::VectorXd& waypoint, double t_s) noexcept;
   /// One cycle.  Same memory and same input: same output, bit for bit.  No allocation, no throw, no clock.
   /// Whatever the input, the torque is finite.
   void plan(const Input& input, Output& output) noexcept;

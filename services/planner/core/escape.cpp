@@ -1,0 +1,143 @@
+#include "services/planner/core/escape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/rbd/rbd.h"
+
+namespace hamel::planner {
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr double kStep_s = 0.01;
+
+/// splitmix64: the same numbers everywhere.
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : state_(seed) {}
+  double uniform(double low, double high) {
+    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+    return low + (high - low) * static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+// Near waypoints first, then anywhere: a small detour is the likelier one to be free, and the shorter.
+VectorXd draw_waypoint(const model::Chain& chain, const VectorXd& q, double spread, Dice& dice) {
+  VectorXd w(chain.n());
+  for (int j = 0; j < chain.n(); ++j) {
+    const model::JointLimits& limits = chain.joint(j).limits;
+    const bool revolute = chain.joint(j).kind == model::JointKind::revolute;
+    const double reach = spread * (revolute ? std::numbers::pi : 0.5);
+    const double margin = std::min(0.1, 0.1 * (limits.upper - limits.lower));
+    const double low = std::max(q[j] - reach, limits.lower + margin);
+    const double high = std::min(q[j] + reach, limits.upper - margin);
+    w[j] = dice.uniform(std::min(low, high), std::max(low, high));
+  }
+  return w;
+}
+
+/// The planner and a model of the arm, stepped together.
+class Rollout {
+ public:
+  Rollout(const scene::Robot& robot, const Options& options)
+      : options_(without_escapes(options)),
+        robot_(robot),
+        planner_(robot, options_),
+        out_(planner_.output()),
+        chain_(weightless(robot.chain)),
+        ws_(chain_),
+        qdd_(VectorXd::Zero(chain_.n())) {}
+
+  struct Ending {
+    bool reached = false;
+    double t_s = 0, error_m = 0;
+  };
+
+  Ending run(const EscapeQuestion& from, const VectorXd& waypoint) {
+    planner_ = Planner(robot_, options_);
+    planner_.set_goal(from.goal);
+    q_ = from.q;
+    qd_ = from.qd;
+    obstacles_ = from.obstacles;
+    const int steps = static_cast<int>(options_.escape_horizon_s / kStep_s);
+    for (int k = 0; k < steps; ++k) {
+      const double t_s = k * kStep_s;
+      planner_.plan({.step = static_cast<std::uint64_t>(k),
+                     .t_s = t_s,
+                     .dt_s = kStep_s,
+                     .q = q_,
+                     .qd = qd_,
+                     .obstacles = obstacles_,
+                     .obstacle_age_s = k == 0 ? from.obstacle_age_s : 0},
+                    out_);
+      if (k == 0) planner_.take_escape(waypoint, t_s);  // the first cycle has begun the goal
+      const Report& r = out_.report;
+      if (r.state == State::reached) return {true, t_s, r.target_error_m};
+      if (r.state == State::stuck || r.state == State::fault || r.reason == Reason::contact) break;
+      advance();
+    }
+    return {false, options_.escape_horizon_s, out_.report.target_error_m};
+  }
+
+ private:
+  static Options without_escapes(Options o) {
+    o.escapes = 0;
+    o.ramp_s = 0;
+    return o;
+  }
+  static model::Chain weightless(const model::Chain& chain) {
+    model::ChainSpec spec = chain.spec();
+    spec.gravity_W_mps2.setZero();
+    return std::move(model::build(std::move(spec))).value();
+  }
+  void advance() {
+    rbd::forward_dynamics(chain_, q_, qd_, out_.torque_Nm, ws_, qdd_);
+    qd_ += kStep_s * qdd_;
+    q_ += kStep_s * qd_;
+    for (geometry::Obstacle& o : obstacles_)
+      if (o.velocity_known) o.X_WO.p += kStep_s * o.V_WO.tail<3>();
+  }
+
+  Options options_;
+  const scene::Robot& robot_;
+  Planner planner_;
+  Output out_;
+  model::Chain chain_;
+  rbd::Workspace ws_;
+  VectorXd q_, qd_, qdd_;
+  std::vector<geometry::Obstacle> obstacles_;
+};
+
+}  // namespace
+
+Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question) {
+  Escape escape;
+  if (question.q.size() != robot.chain.n() || question.q.size() > static_cast<Eigen::Index>(kMaxWaypoint))
+    return escape;
+  EscapeQuestion from = question;
+  from.goal.X_WG.p += from.goal_age_s * from.goal.V_WG.tail<3>();
+  Rollout rollout(robot, options);
+  Dice dice(question.step * 0x2545f4914f6cdd1dull + question.tries);
+  for (int k = 0; k < options.escape_rollouts; ++k) {
+    const double spread = k % 4 == 0 ? 0.15 : k % 4 == 1 ? 0.3 : k % 4 == 2 ? 0.6 : 1.0;
+    const VectorXd waypoint = draw_waypoint(robot.chain, question.q, spread, dice);
+    const Rollout::Ending ending = rollout.run(from, waypoint);
+    ++escape.rollouts;
+    if (!ending.reached) continue;
+    escape.found = true;
+    escape.waypoint = waypoint;
+    escape.reached_after_s = ending.t_s;
+    escape.error_m = ending.error_m;
+    return escape;
+  }
+  return escape;
+}
+
+}  // namespace hamel::planner
