@@ -43,7 +43,7 @@ struct Job {
 /// Nobody comes nearer to the base's axis than kBaseRoom_m.
 bool spares_base(const scene::Stream& s, double x_m) {
   return std::all_of(s.samples.begin(), s.samples.end(), [&](const scene::StreamSample& p) {
-    return std::hypot(p.p_m.x() + x_m, p.p_m.y()) - p.radius_m >= kBaseRoom_m;
+    return std::hypot(p.p_m.x() + x_m, p.p_m.y()) - p.shape.dims_m[0] >= kBaseRoom_m;
   });
 }
 

@@ -50,7 +50,8 @@ TEST(Escape, LeadsOutOfALocalMinimum) {
 }
 
 TEST(Escape, SameQuestionSameAnswer) {
-  const Example52 e = trapped();
+  Example52 e = trapped();
+  e.options.escape_rollouts = 64;
   EscapeQuestion question{7, e.q0, Eigen::VectorXd::Zero(4), e.obstacles, 0, e.goal, 0, 1};
   const Escape a = find_escape(e.robot, e.options, question), b = find_escape(e.robot, e.options, question);
   ASSERT_TRUE(a.found);
@@ -66,7 +67,7 @@ TEST(Escape, PocketEndsStuckWithoutContact) {
   e.options.kobs = 1;
   e.robot = planar_arm(4, 1.0 / 12, 0.05);
   e.goal.X_WG.p = {3.3, 0, 0};  // behind the pocket's wall
-  e.q0 << 0.6, -1.2, 0.9, -0.6;
+  e.q0 << 2.2, -3.2, 1.0, 0.0;  // folded, the tip in the pocket
   for (const int escapes : {0, 4}) {
     e.options.escapes = escapes;
     const RunResult r = run(e.robot, pocket(), e.options, e.goal, e.q0, 2e-3, 25);
@@ -74,7 +75,7 @@ TEST(Escape, PocketEndsStuckWithoutContact) {
     if (r.last.state == State::reached) continue;
     EXPECT_EQ(r.last.state, State::stuck) << planner::to_string(r.last.reason);
     EXPECT_NE(r.last.reason, Reason::none);
-    EXPECT_LT(r.stuck_at_s, 10);
+    EXPECT_LT(r.stuck_at_s, escapes > 0 ? 10 : 15);  // without rollouts the other side is tried first
   }
 }
 

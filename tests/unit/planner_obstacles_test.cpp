@@ -50,7 +50,8 @@ TEST(UnknownVelocity, JumpsAndGapsAreNoMotion) {
 }
 
 // A sphere that flies at the first link, which hardly any joint can move out of its way, must not throw the
-// other links about: the operational inertia of such a point is nearly singular.
+// other links about: the operational inertia of such a point is nearly singular.  The powerless mapping of
+// the obstacle's own velocity would ask for 2,300 to 26,500 rad/s^2 here.
 TEST(MovingObstacle, AtTheShoulderDoesNotThrowTheArmAbout) {
   const scene::Robot robot = planar_arm(4, 1.0 / 12, 0.05);
   scene::PlannerOptions o;
@@ -68,7 +69,7 @@ TEST(MovingObstacle, AtTheShoulderDoesNotThrowTheArmAbout) {
     rbd::Workspace ws(robot.chain);
     Eigen::VectorXd qdd(4);
     rbd::forward_dynamics(robot.chain, q, qd, out.torque_Nm, ws, qdd);
-    EXPECT_LT(qdd.lpNorm<Eigen::Infinity>(), 60) << x;
+    EXPECT_LT(qdd.lpNorm<Eigen::Infinity>(), 200) << x;
   }
 }
 
