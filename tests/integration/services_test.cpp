@@ -196,7 +196,8 @@ wire::TorqueCommand answer(const std::string& folder, std::uint64_t first, std::
   auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder});
   EXPECT_TRUE(brain);
   wire::ObstacleSet set;
-  set.source = 1;
+  set.source = s.arm;
+  set.incarnation = 1;
   set.obstacles.push_back(s.perception.obstacles[0].at_start);
   EXPECT_TRUE(sets.publish(set));
   wire::TorqueCommand newest;
