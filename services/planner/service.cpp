@@ -198,7 +198,10 @@ void PlannerService::plan(Time now) {
                  .qd = qd_,
                  .obstacles = obstacles_,
                  .obstacle_age_s = obstacle_age_s_,
-                 .state_age_s = std::chrono::duration<double>(now - last_state_).count(),
+                 // lockstep waits as long as it takes: nothing ages there
+                 .state_age_s = config_.pace == scene::Pace::lockstep
+                                    ? 0
+                                    : std::chrono::duration<double>(now - last_state_).count(),
                  .obstacles_expected = true};
   planner_.plan(in, output_);
   memory_step_ = state_.step;
