@@ -190,7 +190,7 @@ void PlannerService::plan(Time now) {
         memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
     if (!memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s) planner_.ramp_in();
   }
-  const bool lockstep = config_.pace == scene::Pace::lockstep;  // time waits: nothing is ever old
+  const bool lockstep = config_.pace == scene::Pace::lockstep;  // waits as long as it takes: nothing ages
   const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;
   const Input in{.step = state_.step,
                  .t_s = state_.t_s,
