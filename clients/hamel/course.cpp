@@ -164,7 +164,12 @@ class RecordedRows {
     const auto rows = rows_.find(c.scene->arm);
     if (rows == rows_.end())
       return Problems{{o_.path, fmt::format("holds no state of arm {}", c.scene->arm)}};
-    c.rows = thinned(by_time(rows->second), o_.most_rows);
+    const auto all = by_time(rows->second);
+    const auto n = c.scene->robot.chain.n();
+    if (std::any_of(all.begin(), all.end(), [n](const Row& r) { return r.q.size() != n; }))
+      return Problems{
+          {o_.path, fmt::format("holds an arm of other than the {} joints of {}", n, c.scene->name)}};
+    c.rows = thinned(all, o_.most_rows);
     place_tip(c);
     c.obstacles = some_sets();
     return c;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -237,6 +238,9 @@ int log_csv(const LogArgs& args) {
     if (topic == nullptr) return;
     if (const auto fields = wire::fields(*topic, m.data)) use(fields.value());
   };
+  std::error_code none;
+  if (!args.out_path.empty() && std::filesystem::equivalent(args.path, args.out_path, none))
+    return runtime::complain(verb, {{args.out_path, "is the recording itself"}});
   Columns columns;
   const auto gather = [&](const std::string& name, const record::Message& m) {
     decoded(name, m, [&](const auto& fields) { columns.add(fields); });
