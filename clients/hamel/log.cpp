@@ -69,10 +69,9 @@ int each_message(const char* verb, const LogArgs& args, OnMessage&& on_message, 
     }
     const auto* m = std::get_if<record::Message>(&*item);
     if (m == nullptr) continue;
-    const double t_s = static_cast<double>(m->log_time) * 1e-9;
     const std::string& name = topics[m->channel];
-    if ((wanted != nullptr && name != wanted->name) || t_s < args.begin_s ||
-        (args.end_s >= 0 && t_s > args.end_s))
+    if ((wanted != nullptr && name != wanted->name) || m->log_time < ns(args.begin_s) ||
+        (args.end_s >= 0 && m->log_time > ns(args.end_s)))
       continue;
     any = true;
     if (!on_message(name, *m)) break;

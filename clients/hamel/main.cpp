@@ -1,6 +1,7 @@
 /// hamel: the command line.
 
 #include <cerrno>
+#include <cmath>
 #include <system_error>
 
 #include "clients/hamel/bench.h"
@@ -34,6 +35,16 @@ void add_run_like(CLI::App& app, client::RunArgs& a) {
 }
 
 /// record and log: their options, and what to do when they were asked for.
+/// CLI11's own checks let "nan" pass.
+const CLI::Validator kFinite(
+    [](const std::string& text) {
+      double value = 0;
+      return CLI::detail::lexical_cast(text, value) && std::isfinite(value)
+                 ? std::string()
+                 : text + " is not a finite number";
+    },
+    "", "finite");
+
 class RecordVerbs {
  public:
   explicit RecordVerbs(CLI::App& app) {
@@ -42,6 +53,7 @@ class RecordVerbs {
     record_->add_option("--compression", record_args_.compression, "none, lz4 or zstd")
         ->capture_default_str();
     record_->add_option("--duration", record_args_.duration_s, "end after so many seconds")
+        ->check(kFinite)
         ->check(CLI::PositiveNumber);
     record_->add_option("--scene", record_args_.scene_path,
                         "scene of the run, kept in the recording for replays");
@@ -85,8 +97,12 @@ class RecordVerbs {
   }
   void add_part(CLI::App& verb) {
     verb.add_option("--topic", log_args_.topic, "one topic: state, command, obstacles, report, ...");
-    verb.add_option("--start", log_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
-    verb.add_option("--until", log_args_.end_s, "up to this time of the run")->type_name("SECONDS");
+    verb.add_option("--start", log_args_.begin_s, "from this time of the run on")
+        ->type_name("SECONDS")
+        ->check(kFinite);
+    verb.add_option("--until", log_args_.end_s, "up to this time of the run")
+        ->type_name("SECONDS")
+        ->check(kFinite);
   }
 
   void add_replay(CLI::App& app) {
@@ -117,10 +133,15 @@ class RecordVerbs {
         ->allow_extra_args(false)
         ->capture_default_str();
     play_->add_option("--rate", play_args_.rate, "recorded seconds a second")
+        ->check(kFinite)
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    play_->add_option("--start", play_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
-    play_->add_option("--until", play_args_.end_s, "up to this time of the run")->type_name("SECONDS");
+    play_->add_option("--start", play_args_.begin_s, "from this time of the run on")
+        ->type_name("SECONDS")
+        ->check(kFinite);
+    play_->add_option("--until", play_args_.end_s, "up to this time of the run")
+        ->type_name("SECONDS")
+        ->check(kFinite);
     play_->add_flag("--loop", play_args_.loop, "begin anew at the end, until Ctrl-C");
     play_->add_flag("--control", play_args_.control,
                     "obey standard input: pause, resume, step, quit, or the keys space . q");
