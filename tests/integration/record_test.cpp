@@ -213,6 +213,22 @@ TEST_P(EveryCompression, AFlippedBitIsSaidAndTheRestIsRead) {
   EXPECT_LE(most_lost, 60u) << "one chunk";
 }
 
+TEST_P(EveryCompression, AFlippedBitOfTheMagicCostsNothing) {
+  const std::string file = path("sound"), bad = path("flipped");
+  write_file(file, GetParam(), 600);
+  const Contents sound = read(file);
+  ASSERT_GT(sound.attachments, 0u);
+  for (std::size_t at = 0; at < 8; ++at) {
+    std::string changed = load(file);
+    changed[at] = static_cast<char>(changed[at] ^ 4);
+    store(bad, changed);
+    const Contents found = read(bad);
+    EXPECT_FALSE(found.damages.empty());
+    EXPECT_EQ(found.messages.size(), 600u);
+    EXPECT_EQ(found.attachments, sound.attachments);
+  }
+}
+
 TEST_P(EveryCompression, AnyBytesAreReadWithoutACrash) {
   const std::string file = path("seed"), bad = path("noise");
   write_file(file, GetParam(), 100);
