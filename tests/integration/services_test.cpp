@@ -11,30 +11,14 @@
 #include "services/perception/service.h"
 #include "services/planner/obstacle_view.h"
 #include "services/planner/service.h"
+#include "tests/support/services.h"
 
 using namespace hamel;
 using runtime::Clock;
+using test::node;
 using namespace std::chrono_literals;
 
 namespace {
-
-scene::Scene load(const std::string& name, std::vector<std::string> overrides = {}) {
-  auto s =
-      files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/" + name + ".textproto", overrides);
-  if (!s) {
-    for (const auto& p : s.error()) ADD_FAILURE() << to_string(p);
-    std::abort();
-  }
-  return std::move(s).value();
-}
-
-std::unique_ptr<bus::Node> node(std::uint32_t domain) {
-  bus::NodeOptions o;
-  o.domain = domain;
-  auto n = bus::open(o);
-  EXPECT_TRUE(n);
-  return std::move(n).value();
-}
 
 /// A planner in lockstep that turns the first joint; one bit of one command may be flipped on its way.
 class RelayedPlanner {
@@ -72,7 +56,7 @@ class RelayedPlanner {
 
 wire::RunSummary run_relayed(std::uint64_t flip_at) {
   const auto n = node(1);
-  const scene::Scene s = load("four_link_avoid", {"duration_s=0.2"});
+  const scene::Scene s = test::shipped("four_link_avoid", {"duration_s=0.2"});
   wire::Subscription<wire::RunSummary> summaries(*n);
   RelayedPlanner planner(*n, flip_at);
   auto arm = dynamics::DynamicsService::make(*n, s, {});
@@ -102,7 +86,7 @@ TEST(Lockstep, OneFlippedBitOfOneCommandChangesTheTrajectoryHash) {
 
 TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
   const auto n = node(2);
-  const scene::Scene s = load("four_link_avoid");
+  const scene::Scene s = test::shipped("four_link_avoid");
   auto arm = dynamics::DynamicsService::make(*n, s, {.patience = 50ms});
   ASSERT_TRUE(arm);
   const auto deadline = Clock::now() + 30s;
@@ -115,7 +99,7 @@ TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
 
 TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
   const auto n = node(3);
-  const scene::Scene s = load("four_link_avoid");
+  const scene::Scene s = test::shipped("four_link_avoid");
   wire::Publisher<wire::TorqueCommand> commands(*n);
   auto arm = dynamics::DynamicsService::make(*n, s, {});
   ASSERT_TRUE(arm);
@@ -150,7 +134,7 @@ TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
 /// Runs a scene in lockstep to `until`, all services new, with checkpoints in `folder`.
 wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain) {
   const auto n = node(domain);
-  scene::Scene s = load("four_link_avoid", {"planner.method=gyro"});
+  scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
   s.duration_s = until_s;
   wire::Subscription<wire::RunSummary> summaries(*n);
   auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder});
