@@ -7,6 +7,7 @@
 
 #include "common/files/scene_convert.h"
 #include "common/files/text_fields.h"
+#include "common/scene/reduce.h"
 
 namespace hamel::files {
 namespace {
@@ -104,7 +105,10 @@ class Loader {
                    std::move(parts.perception),
                    parts.bus,
                    parts.duration_s,
-                   parts.stop};
+                   parts.stop,
+                   parts.reduce,
+                   parts.accuracy,
+                   std::move(parts.locked)};
     if (s.name.empty()) s.name = std::filesystem::path(path_).stem().string();
     Problems broken = scene::problems(s);
     std::erase_if(broken, [&](const Problem& p) { return is_said(p.where, s, real); });
@@ -117,7 +121,8 @@ class Loader {
   static bool is_said(const std::string& path, const scene::Scene& s, bool real_robot) {
     if (path == "perception.stream.path") return s.perception.stream->samples.empty();
     const bool of_joints = path.starts_with("q0") || path.starts_with("qd0") ||
-                           path.starts_with("goal.joints") || path == "planner.kc";
+                           path.starts_with("goal.joints") || path.starts_with("locked") ||
+                           path == "planner.kc";
     return of_joints && !real_robot;
   }
 
@@ -153,8 +158,14 @@ class Loader {
 
 }  // namespace
 
-Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+Checked<scene::Scene> read_scene(const std::string& path, const std::vector<std::string>& overrides) {
   return Loader(path, overrides).load();
+}
+
+Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  auto scene = read_scene(path, overrides);
+  if (scene) scene::reduce(scene.value());
+  return scene;
 }
 
 }  // namespace hamel::files

@@ -6,14 +6,22 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <optional>
+#include <span>
 #include <vector>
 
+#include "common/scene/reach.h"
 #include "common/wire/messages.h"
 
 namespace hamel::planner {
 
 class ObstacleView {
  public:
+  /// Shows every obstacle.
+  ObstacleView() = default;
+  /// Leaves out what the scene's reductions `obstacles` and `links` allow; the planner's output is the same.
+  explicit ObstacleView(const scene::Scene& scene);
+
   /// Keeps a set until a newer one covers its time.  A set older than one already used, or one that is held
   /// already, is passed over; a raised incarnation starts its source afresh.
   void add(const wire::ObstacleSet& set);
@@ -22,15 +30,29 @@ class ObstacleView {
   /// False before the first set.
   bool covers(double t_s) const;
 
-  /// Puts the newest sets not younger than `t_s` together, in the order of their sources.  Returns the age of
-  /// the oldest of them [s], 0 for sets that promised no successor, +inf where there is none.
-  double at(double t_s, std::vector<geometry::Obstacle>& out, wire::Causes& causes);
+  /// Puts the newest sets not younger than `t_s` together, in the order of their sources, for an arm at `q`.
+  /// Returns the age of the oldest of them [s], 0 for sets that promised no successor, +inf where there is
+  /// none.  Sets are put together and sifted once, not at each call.
+  double at(double t_s, const Eigen::VectorXd& q, wire::Causes& causes);
+  /// What at() found; until the next call of it or add().
+  std::span<const geometry::Obstacle> obstacles() const noexcept { return shown_; }
+  /// For each link a distance that no obstacle comes under; empty: nothing is known (Input::link_floor_m).
+  std::span<const double> link_floor_m() const noexcept { return floor_shown_; }
 
   bool empty() const { return sources_.empty(); }
 
  private:
+  void put_together();
+
   using Queue = std::deque<wire::ObstacleSet>;  // ordered by time
   std::map<std::uint32_t, Queue> sources_;
+  std::optional<scene::Reach> reach_;
+  bool cull_ = false, skip_links_ = false;
+  bool changed_ = false;  ///< other sets hold than when all_ was put together
+  std::vector<geometry::Obstacle> all_, kept_;
+  std::vector<double> floor_m_;
+  std::span<const geometry::Obstacle> shown_;
+  std::span<const double> floor_shown_;
 };
 
 }  // namespace hamel::planner

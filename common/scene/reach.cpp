@@ -1,0 +1,146 @@
+#include "common/scene/reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hamel::scene {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kSlack_m = 1e-9;  // rounding of distances
+
+/// How far joint i may slide.
+double travel_m(const model::Joint& joint) {
+  if (joint.kind != model::JointKind::prismatic) return 0;
+  return std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
+}
+
+/// The point of joint 0's axis next to p (both in link 0's frame), which does not move; for a slide the
+/// origin.
+Vector3d pivot(const model::Joint& first, const Vector3d& p) {
+  if (first.kind == model::JointKind::prismatic) return Vector3d::Zero();
+  return first.axis * first.axis.dot(p);
+}
+
+ReachBall ball_of(const model::Chain& chain, int link, const geometry::Capsule& capsule_B) {
+  const lie::Pose X_W0 = chain.X_WB0() * chain.joint(0).X_PJ;
+  const auto extent = [&](const Vector3d& from) {
+    return std::max((capsule_B.p0 - from).norm(), (capsule_B.p1 - from).norm());
+  };
+  ReachBall ball;
+  ball.link = link;
+  ball.radius_m = capsule_B.radius_m;
+  ball.axis_m = travel_m(chain.joint(0));
+  if (link == 0) {
+    const Vector3d c = pivot(chain.joint(0), 0.5 * (capsule_B.p0 + capsule_B.p1));
+    ball.centre_W = X_W0 * c;
+    ball.axis_m += extent(c);
+    return ball;
+  }
+  const Vector3d c = pivot(chain.joint(0), chain.joint(1).X_PJ.p);
+  ball.centre_W = X_W0 * c;
+  ball.axis_m += (chain.joint(1).X_PJ.p - c).norm() + travel_m(chain.joint(1)) + extent(Vector3d::Zero());
+  for (int j = 2; j <= link; ++j) ball.axis_m += chain.joint(j).X_PJ.p.norm() + travel_m(chain.joint(j));
+  return ball;
+}
+
+/// The ball about the shoulder within which a target counts as reachable, with the last link's capsule about
+/// it.
+ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
+  const model::Chain& chain = robot.chain;
+  ReachBall ball;
+  ball.link = chain.n() - 1;
+  ball.centre_W = chain.X_WB0() * chain.joint(0).X_PJ.p;
+  ball.axis_m = chain.X_NE().p.norm() + options.goal_tolerance_m + travel_m(chain.joint(0));
+  for (int j = 1; j < chain.n(); ++j) ball.axis_m += chain.joint(j).X_PJ.p.norm() + travel_m(chain.joint(j));
+  for (const LinkShape& s : robot.shapes)
+    if (s.link == ball.link)
+      ball.radius_m = std::max(ball.radius_m, geometry::enclosing_capsule(s.shape).radius_m);
+  return ball;
+}
+
+bool is_plain(const geometry::Obstacle& o) {
+  return o.X_WO.p.allFinite() && o.X_WO.R.allFinite() && o.shape.dims_m.allFinite() &&
+         (o.shape.dims_m.array() >= 0).all() && std::isfinite(o.sigma_m) &&
+         (!o.velocity_known || (o.V_WO.allFinite() && o.V_WO.head<3>().isZero(0)));
+}
+
+double distance_m(const Vector3d& p_W, const geometry::Obstacle& o) {
+  return geometry::closest({p_W, p_W, 0, 0}, o.shape, o.X_WO).distance_m;
+}
+
+}  // namespace
+
+Reach::Reach(const Robot& robot, const PlannerOptions& options)
+    : target_(target_ball(robot, options)),
+      chain_(robot.chain),
+      rho0_m_(options.rho0_m),
+      margin_m_(options.barrier_gain > 0 ? options.dmin_m : 0),
+      assumed_speed_mps_(options.assumed_speed_mps) {
+  for (const LinkShape& s : robot.shapes)
+    if (s.link >= 0) balls_.push_back(ball_of(chain_, s.link, s.X_LS * geometry::enclosing_capsule(s.shape)));
+}
+
+bool Reach::holds(const Eigen::VectorXd& q) const noexcept {
+  for (int i = 0; i < chain_.n(); ++i) {
+    const model::Joint& joint = chain_.joint(i);
+    if (joint.kind == model::JointKind::prismatic && !(std::abs(q[i]) <= travel_m(joint))) return false;
+  }
+  return true;
+}
+
+/// How much nearer an obstacle may be than where it was stamped: its way in the horizon.
+double Reach::spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept {
+  if (!o.velocity_known) return 0;  // it stays, and grows by assumed_speed
+  const double v = o.V_WO.tail<3>().norm();
+  return v > 0 ? v * horizon_s : 0;
+}
+
+void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
+                 std::vector<geometry::Obstacle>& kept, std::vector<double>& floor_m) const {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const auto n = static_cast<std::size_t>(chain_.n());
+  const auto grows_m = [&](const geometry::Obstacle& o) {
+    const double aged = o.velocity_known || assumed_speed_mps_ == 0 ? 0 : assumed_speed_mps_ * horizon_s;
+    return 2 * std::max(o.sigma_m, 0.0) + aged;
+  };
+  kept.clear();
+  floor_m.assign(n, inf);
+  std::vector<double> nearest_at_most(n, inf);  // of the obstacle that is nearest to each link
+  std::vector<double> centre(set.size() * balls_.size());
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    const geometry::Obstacle& o = set[k];
+    const bool plain = is_plain(o);
+    for (std::size_t b = 0; b < balls_.size(); ++b) {
+      const ReachBall& ball = balls_[b];
+      const auto link = static_cast<std::size_t>(ball.link);
+      if (!plain) {
+        floor_m[link] = -inf;
+        continue;
+      }
+      const double s = distance_m(ball.centre_W, o) - ball.radius_m, way = spread_m(o, horizon_s) + kSlack_m;
+      centre[k * balls_.size() + b] = s;
+      nearest_at_most[link] = std::min(nearest_at_most[link], s + ball.axis_m + way);
+      floor_m[link] = std::min(floor_m[link], s - ball.axis_m - way - grows_m(o));
+    }
+  }
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    const geometry::Obstacle& o = set[k];
+    bool matters = !is_plain(o);
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = grows_m(o);
+    for (std::size_t b = 0; b < balls_.size() && !matters; ++b) {
+      const double least = centre[k * balls_.size() + b] - balls_[b].axis_m - way;
+      const double nearest = nearest_at_most[static_cast<std::size_t>(balls_[b].link)];
+      matters = !(least - grown > rho0_m_ && least > nearest);
+    }
+    if (!matters) {
+      const double at_target = distance_m(target_.centre_W, o) - target_.axis_m - target_.radius_m - way;
+      matters = !(at_target - grown > margin_m_);
+    }
+    if (matters) kept.push_back(o);
+  }
+}
+
+}  // namespace hamel::scene

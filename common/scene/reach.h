@@ -1,0 +1,54 @@
+#pragma once
+/// How far an arm reaches, whatever its joints do, and which obstacles can therefore never matter to it.
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "common/geometry/distance.h"
+#include "common/scene/scene.h"
+
+namespace hamel::scene {
+
+/// A ball that the axis of a link's capsule never leaves.
+struct ReachBall {
+  int link = 0;
+  Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
+  double axis_m = 0;    ///< how far from the centre the capsule's axis may be; +inf: a slide without limits
+  double radius_m = 0;  ///< of the capsule
+};
+
+/// The balls of a robot: about a point of the first joint's axis, offsets stretched out, slides at their
+/// limits.
+///
+/// With s the signed distance of a ball's centre to an obstacle, the link's distance to it is always within
+/// [s - axis - radius, s + axis - radius], because a signed distance changes by no more than one walks.
+class Reach {
+ public:
+  Reach(const Robot& robot, const PlannerOptions& options);
+
+  /// True while q keeps to what the balls stand on: slides within their limits.
+  bool holds(const Eigen::VectorXd& q) const noexcept;
+
+  /// Puts those of `set` that may matter within `horizon_s` into `kept`, in their order, and into `floor_m`
+  /// (size n) for each link a distance (less what the planner inflates obstacles by) that none comes under in
+  /// that time.
+  ///
+  /// An obstacle matters where it may come into the range of a force or barrier (rho0), may be the nearest to
+  /// some link, or may lie over a target that the arm reaches.  What is left out changes no output of the
+  /// planner.  Obstacles that turn, or are not finite, are kept.  O(links x obstacles).
+  void sift(std::span<const geometry::Obstacle> set, double horizon_s, std::vector<geometry::Obstacle>& kept,
+            std::vector<double>& floor_m) const;
+
+  std::span<const ReachBall> balls() const noexcept { return balls_; }
+
+ private:
+  double spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
+
+  std::vector<ReachBall> balls_;
+  ReachBall target_;  ///< where the end effector's body is when it is at a target that can be reached
+  model::Chain chain_;
+  double rho0_m_ = 0, margin_m_ = 0, assumed_speed_mps_ = 0;
+};
+
+}  // namespace hamel::scene
