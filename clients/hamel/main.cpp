@@ -1,6 +1,7 @@
 /// hamel: the command line.
 
 #include "clients/hamel/batch_verb.h"
+#include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/explain.h"
 #include "clients/hamel/figures.h"
@@ -267,9 +268,11 @@ int verbs(int argc, char** argv) {
   const auto* batch = add_batch(app, batch_args);
 
   RecordVerbs recordings(app);
+  client::BenchVerb bench(app);
 
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   if (const auto code = recordings.run()) return *code;
+  if (const auto code = bench.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (figures->parsed()) return client::figures(figures_args);
   if (explain->parsed()) return client::explain(explain_args);

@@ -323,4 +323,11 @@ SceneParts to_parts(const text::Scene& m) {
   return out;
 }
 
+Problems to_options(const text::Planner& message, scene::PlannerOptions& options) {
+  Problems missing;
+  std::string bus;
+  read_planner({message, "planner.", missing}, options, bus);
+  return missing;
+}
+
 }  // namespace hamel::files

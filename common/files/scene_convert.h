@@ -6,8 +6,9 @@
 #include "common/scene/scene.h"
 
 namespace hamel::text {
+class Planner;
 class Scene;
-}
+}  // namespace hamel::text
 
 namespace hamel::files {
 
@@ -33,5 +34,7 @@ struct SceneParts {
 };
 
 SceneParts to_parts(const text::Scene& message);
+/// What `message` says goes over what `options` hold; returns what is wrong with it.
+Problems to_options(const text::Planner& message, scene::PlannerOptions& options);
 
 }  // namespace hamel::files

@@ -168,4 +168,16 @@ Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std:
   return scene;
 }
 
+Problems set_planner(const std::vector<std::string>& assignments, scene::PlannerOptions& options) {
+  text::Planner message;
+  Problems found;
+  for (const std::string& a : assignments)
+    if (const std::string why = apply_override(a, message); !why.empty()) found.push_back({a, why});
+  const Problems bad = to_options(message, options);
+  found.insert(found.end(), bad.begin(), bad.end());
+  const Problems broken = scene::problems(options);
+  found.insert(found.end(), broken.begin(), broken.end());
+  return found;
+}
+
 }  // namespace hamel::files

@@ -24,6 +24,10 @@ Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std:
 /// The same scene as written.
 Checked<scene::Scene> read_scene(const std::string& path, const std::vector<std::string>& overrides = {});
 
+/// Changes planner options by assignments such as "kc=1" or "method=gyro", in order; every problem of them
+/// and every rule the outcome violates.
+Problems set_planner(const std::vector<std::string>& assignments, scene::PlannerOptions& options);
+
 /// A whole file, or the problem that kept it from being read (absent, a folder, no permission, over 256 MB).
 Checked<std::string> read_file(const std::string& path);
 

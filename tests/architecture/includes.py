@@ -41,6 +41,7 @@ ONLY_IN = {
     r"^hamel_v1": ("common/wire",),
     r"^(google/protobuf|urdf_|tinyxml2)": ("common/files",),
     r"^(lz4|zstd|zlib)": ("common/record", "common/runtime"),
+    r"^fcl/": ("clients/hamel",),
     r"^spdlog/": ("common/runtime", "clients/hamel"),
 }
 

@@ -1,0 +1,41 @@
+#pragma once
+/// Reactive planning measured on many scenes, methods side by side: `hamel bench planner`.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hamel::client {
+
+struct BenchArgs {
+  std::vector<std::string> families, methods;  ///< empty: all
+  std::vector<int> spheres;                    ///< cells with these numbers of spheres; empty: all
+  std::size_t scenes = 100;                    ///< of each cell
+  std::uint64_t seed = 1;
+  std::string model = "prototype";
+  double dt_s = 0.002;
+  bool velocities_unknown = false;
+  int jobs = 0;  ///< threads; 0: one a processor
+  std::vector<std::string> overrides;
+  std::string csv_path, plot_path;
+  bool json = false;
+};
+
+/// 0; 2 bad input; 130 interrupted, with what was done printed.
+int bench_planner(const BenchArgs& args);
+
+/// The verb `bench` with its options.
+class BenchVerb {
+ public:
+  explicit BenchVerb(CLI::App& app);
+  /// The exit code when the verb was asked for.
+  std::optional<int> run() const;
+
+ private:
+  BenchArgs args_;
+  CLI::App* planner_ = nullptr;
+};
+
+}  // namespace hamel::client

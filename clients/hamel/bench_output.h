@@ -1,0 +1,31 @@
+#pragma once
+/// What `hamel bench planner` writes: table, CSV, JSON, picture.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/hamel/bench_families.h"
+#include "clients/hamel/bench_tally.h"
+#include "common/base/result.h"
+
+namespace hamel::client {
+
+/// The tallies of one cell, one for each method.
+struct CellTally {
+  Cell cell;
+  std::vector<std::string> methods;
+  std::vector<Tally> tallies;
+};
+
+/// "panda_static 16" or "example_5_2, damping 0.5, vmax 1".
+std::string label(const Cell& cell);
+void print_table(const std::vector<CellTally>& all);
+void print_json(const std::vector<CellTally>& all, const std::string& settings);
+/// A line for each trial.
+std::optional<Problem> write_csv(const std::string& path, const std::vector<CellTally>& all);
+/// Rates of reaching and of collision, a group of bars for each cell.
+std::optional<Problem> draw_rates(const std::string& path, const std::string& title,
+                                  const std::vector<CellTally>& all);
+
+}  // namespace hamel::client

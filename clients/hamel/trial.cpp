@@ -1,0 +1,229 @@
+#include "clients/hamel/trial.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "common/rbd/rbd.h"
+#include "services/dynamics/arm.h"
+#include "services/perception/core/source.h"
+
+namespace hamel::client {
+
+namespace {
+
+constexpr double kFirstBin_s = 1e-8, kBinRatio = 1.08;
+
+/// Distance to the goal as the user means it, from the arm's state alone.
+class Arrival {
+ public:
+  explicit Arrival(const scene::Scene& s) : scene_(s), ws_(s.robot.chain) {}
+
+  /// True once the goal has been held long enough.
+  bool update(double t_s, const Eigen::VectorXd& q, const Eigen::VectorXd& qd) {
+    const scene::PlannerOptions& o = scene_.planner;
+    const scene::Goal& goal = *scene_.goal;
+    rbd::velocities(scene_.robot.chain, q, qd, ws_);
+    const lie::Pose X_WE = rbd::tip(scene_.robot.chain, ws_);
+    if (known_) path_m += (X_WE.p - tip_).norm();
+    known_ = true;
+    tip_ = X_WE.p;
+    const lie::Twist& V_B = ws_.V_B.back();
+    const lie::Pose& X_WB = ws_.X_WB.back();
+    double speed = (X_WB.R * (V_B.tail<3>() + V_B.head<3>().cross(scene_.robot.chain.X_NE().p))).norm();
+    bool within = false;
+    if (goal.kind == scene::GoalKind::joints) {
+      error_m = (goal.joints - q).lpNorm<Eigen::Infinity>();
+      within = error_m <= o.goal_tolerance_joint;
+      speed = qd.lpNorm<Eigen::Infinity>();
+    } else {
+      error_m = (goal.X_WG.p + t_s * goal.V_WG.tail<3>() - tip_).norm();
+      within = error_m <= o.goal_tolerance_m;
+      if (goal.kind == scene::GoalKind::pose)
+        within &= Eigen::AngleAxisd(goal.X_WG.R * X_WE.R.transpose()).angle() <= o.goal_tolerance_rad;
+    }
+    if (!(within && speed < o.goal_speed))
+      since_s = -1;
+    else if (since_s < 0)
+      since_s = t_s;
+    return since_s >= 0 && t_s - since_s >= o.goal_hold_s;
+  }
+
+  double error_m = 0, path_m = 0, since_s = -1;
+
+ private:
+  const scene::Scene& scene_;
+  rbd::Workspace ws_;
+  Eigen::Vector3d tip_ = Eigen::Vector3d::Zero();
+  bool known_ = false;
+};
+
+/// What the planner is told of the obstacles, and how old it is.
+class Senses {
+ public:
+  Senses(const perception::Source& source, const TrialOptions& options) : source_(source), options_(options) {
+    seen_.reserve(source.most_obstacles());
+  }
+  void look(double t_s) {
+    if (options_.perfect_perception) {
+      source_.at(t_s, seen_);
+      age_s = 0;
+    } else {
+      while (next_s_ <= t_s + 1e-12) {
+        if (source_.at(next_s_, seen_)) stamp_s_ = next_s_;
+        next_s_ = source_.next_time(next_s_);
+      }
+      age_s = source_.is_static() ? 0 : t_s - stamp_s_;
+    }
+    if (!options_.velocities_known)
+      for (geometry::Obstacle& o : seen_) o.velocity_known = false;
+  }
+  const std::vector<geometry::Obstacle>& seen() const { return seen_; }
+  double age_s = 0;
+
+ private:
+  const perception::Source& source_;
+  const TrialOptions& options_;
+  std::vector<geometry::Obstacle> seen_;
+  double stamp_s_ = 0, next_s_ = 0;
+};
+
+class Run {
+ public:
+  Run(const scene::Scene& scene, const TrialOptions& options, const perception::Source& source)
+      : scene_(scene),
+        options_(options),
+        source_(source),
+        senses_(source, options),
+        arm_(scene),
+        planner_(scene.robot, scene.planner),
+        out_(planner_.output()),
+        judge_(scene.robot, options.self_pairs),
+        arrival_(scene) {
+    planner_.set_goal(*scene.goal);
+    truth_.reserve(source.most_obstacles());
+    qd_before_ = scene.qd0;
+    qdd_before_ = Eigen::VectorXd::Zero(scene.qd0.size());
+  }
+
+  Trial run() {
+    const auto steps = static_cast<std::uint64_t>(std::llround(scene_.duration_s / scene_.dynamics.dt_s));
+    const auto every = static_cast<std::uint64_t>(scene_.planner.period_steps);
+    for (std::uint64_t k = 0; k <= steps && !over_; ++k) {
+      if (observe()) break;
+      if (k % every == 0) plan();
+      if (k == steps || (k % 64 == 0 && options_.stop && options_.stop())) break;
+      const dynamics::Drive drive{dynamics::DriveKind::torque, &out_.torque_Nm, false};
+      if (!arm_.advance(drive)) {
+        trial_.ending = Ending::failed;
+        over_ = true;
+      }
+      trial_.saturated_steps += arm_.torque_saturated();
+      sum_variation();
+    }
+    if (!over_)
+      trial_.ending = out_.report.state == planner::State::stuck ? Ending::stuck : Ending::timed_out;
+    trial_.end_s = arm_.t_s();
+    trial_.path_m = arrival_.path_m;
+    trial_.error_m = arrival_.error_m;
+    trial_.clearance_min_m = judge_.clearance_min_m();
+    trial_.reason = out_.report.reason;
+    if (trial_.end_s > 0) trial_.jerkiness /= trial_.end_s;
+    return std::move(trial_);
+  }
+
+ private:
+  // The truth at this state: touched, or arrived.
+  bool observe() {
+    const double t_s = arm_.t_s();
+    if (!source_.at(t_s, truth_)) truth_.clear();
+    if (const Contact* c = judge_.advance(t_s, arm_.state().q, truth_)) {
+      trial_.contact = *c;
+      trial_.ending = Ending::collided;
+      plan();
+      trial_.contact_reported = out_.report.reason == planner::Reason::contact;
+      return over_ = true;
+    }
+    if (arrival_.update(t_s, arm_.state().q, arm_.state().qd)) {
+      trial_.ending = Ending::reached;
+      trial_.time_s = arrival_.since_s;
+      return over_ = true;
+    }
+    return false;
+  }
+
+  void plan() {
+    const double t_s = arm_.t_s();
+    senses_.look(t_s);
+    const planner::Input in{.step = arm_.state().step,
+                            .t_s = t_s,
+                            .dt_s = scene_.planner.period_steps * scene_.dynamics.dt_s,
+                            .q = arm_.state().q,
+                            .qd = arm_.state().qd,
+                            .obstacles = senses_.seen(),
+                            .obstacle_age_s = senses_.age_s};
+    const double began_s = options_.now_s ? options_.now_s() : 0;
+    planner_.plan(in, out_);
+    if (options_.now_s) trial_.cycle.add(options_.now_s() - began_s);
+    ++trial_.cycles;
+    trial_.infeasible_cycles += out_.report.reason == planner::Reason::infeasible;
+  }
+
+  void sum_variation() {
+    qdd_ = (arm_.state().qd - qd_before_) / scene_.dynamics.dt_s;
+    if (arm_.state().step > 1) trial_.jerkiness += (qdd_ - qdd_before_).lpNorm<1>();
+    qd_before_ = arm_.state().qd;
+    qdd_before_ = qdd_;
+  }
+
+  const scene::Scene& scene_;
+  const TrialOptions& options_;
+  const perception::Source& source_;
+  Senses senses_;
+  dynamics::Arm arm_;
+  planner::Planner planner_;
+  planner::Output out_;
+  Judge judge_;
+  Arrival arrival_;
+  std::vector<geometry::Obstacle> truth_;
+  Eigen::VectorXd qd_before_, qdd_before_, qdd_;
+  Trial trial_;
+  bool over_ = false;
+};
+
+}  // namespace
+
+void Durations::add(double s) noexcept {
+  const double bin = std::log(std::max(s, kFirstBin_s) / kFirstBin_s) / std::log(kBinRatio);
+  ++bins_[std::min(static_cast<std::size_t>(bin), bins_.size() - 1)];
+  ++count_;
+}
+
+void Durations::add(const Durations& other) noexcept {
+  for (std::size_t i = 0; i < bins_.size(); ++i) bins_[i] += other.bins_[i];
+  count_ += other.count_;
+}
+
+double Durations::quantile(double part) const noexcept {
+  if (count_ == 0) return std::numeric_limits<double>::quiet_NaN();
+  std::uint64_t below = 0;
+  for (std::size_t i = 0; i < bins_.size(); ++i) {
+    below += bins_[i];
+    if (static_cast<double>(below) >= part * static_cast<double>(count_))
+      return kFirstBin_s * std::pow(kBinRatio, static_cast<double>(i + 1));
+  }
+  return kFirstBin_s * std::pow(kBinRatio, static_cast<double>(bins_.size()));
+}
+
+const char* to_string(Ending v) {
+  static constexpr std::array names{"reached", "collision", "stuck", "timeout", "failed"};
+  return names[static_cast<std::size_t>(v)];
+}
+
+Trial run_trial(const scene::Scene& scene, const TrialOptions& options) {
+  const auto source = perception::Source::make(scene.perception);
+  if (!source || !scene.goal) return {};
+  return Run(scene, options, source.value()).run();
+}
+
+}  // namespace hamel::client

@@ -1,0 +1,70 @@
+#pragma once
+/// One run of a scene in this process without any bus: planner core, integrator and an independent judge.
+/// Pure but for an injected clock.  Same scene, same result.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/hamel/judge.h"
+#include "common/scene/scene.h"
+#include "services/planner/core/planner.h"
+
+namespace hamel::client {
+
+/// Durations in bins 8 % apart, from 10 ns to 1 s.
+class Durations {
+ public:
+  void add(double s) noexcept;
+  void add(const Durations& other) noexcept;
+  /// Upper edge of the bin that holds this part of them [s]; NaN when empty.
+  double quantile(double part) const noexcept;
+
+ private:
+  std::array<std::uint32_t, 240> bins_{};
+  std::uint64_t count_ = 0;
+};
+
+enum class Ending : std::uint8_t { reached, collided, stuck, timed_out, failed };
+const char* to_string(Ending v);
+
+struct TrialOptions {
+  /// Obstacles are known at every cycle as they are then; else only at the set times of perception.
+  bool perfect_perception = true;
+  bool velocities_known = true;
+  std::vector<std::pair<int, int>> self_pairs = {};  ///< judged too
+  std::function<double()> now_s = {};                ///< clock for cycle times; empty: not timed
+  std::function<bool()> stop = {};                   ///< asked now and then; true: the trial ends as failed
+};
+
+/// How a trial went, all of it measured from the arm's states and not taken from the planner's report, but
+/// for what is named so.
+struct Trial {
+  Ending ending = Ending::failed;
+  double end_s = 0;
+  double time_s = std::numeric_limits<double>::quiet_NaN();  ///< to the goal, where reached
+  double path_m = 0;                                         ///< of the end effector
+  double clearance_min_m = std::numeric_limits<double>::infinity();
+  double error_m = 0;  ///< at the end
+  std::optional<Contact> contact;
+  bool contact_reported = true;  ///< after a contact the planner's next report was UNSAFE contact
+  planner::Reason reason = planner::Reason::none;  ///< the planner's last one
+  std::uint64_t infeasible_cycles = 0;             ///< the planner reported infeasible
+  std::uint64_t cycles = 0, saturated_steps = 0;
+  double jerkiness = 0;  ///< total variation of qdd [rad/s^2 per s]
+  Durations cycle;
+};
+
+/// Runs `scene` until it is reached, something touches, or its duration is over.
+///
+/// Reached: position goals within goal_tolerance_m below goal_speed for goal_hold_s; pose and joint goals
+/// with their tolerances.  Stuck: not reached and the planner's last state is STUCK.  Failed: the integrator
+/// refused a step, or the planner asked for a number that is not finite.
+Trial run_trial(const scene::Scene& scene, const TrialOptions& options = {});
+
+}  // namespace hamel::client
