@@ -16,7 +16,7 @@ using scene::Tier;
 using trade::kSamples;
 
 constexpr int kHalvings = 5;      // of a steered reference's step
-constexpr double kSafety = 0.8;   // a setting is chosen when it keeps to this part of what was asked
+constexpr double kBetween = 2;     // an error between two instants, of the largest at one
 constexpr double kCycle_us = 12;  // one planner cycle
 constexpr double kShortRun_s = 0.05;
 
@@ -169,9 +169,13 @@ Setting measure(const scene::Scene& s, const Converged& reference, const trade::
   return path.setting;
 }
 
-bool meets(const scene::Accuracy& asked, const Setting& s) noexcept {
-  return s.finished && s.same_end && s.joint_error <= kSafety * asked.joint_error_rad &&
-         s.energy_error <= kSafety * asked.energy_error_rel;
+double error_bound(const Setting& s, const Converged& reference) noexcept {
+  return kBetween * (s.joint_error + reference.uncertainty);
+}
+
+bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& reference) noexcept {
+  return s.finished && s.same_end && error_bound(s, reference) <= asked.joint_error_rad &&
+         s.energy_error <= asked.energy_error_rel;
 }
 
 Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
@@ -182,12 +186,13 @@ Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
     if (watch.stop()) return out;
     out.tried.push_back(measure(with(s, o), out.reference, watch));
     const Setting& now = out.tried.back();
-    if (meets(s.accuracy, now) && (!out.chosen || now.work_per_s < out.chosen->work_per_s)) out.chosen = now;
+    if (meets(s.accuracy, now, out.reference) && (!out.chosen || now.work_per_s < out.chosen->work_per_s)) out.chosen = now;
   }
   return out;
 }
 
-void apply(const Setting& setting, scene::Scene& s) {
+void apply(const Choosing& c, scene::Scene& s) {
+  const Setting& setting = *c.chosen;
   for (scene::Reduction& r : s.reductions) {
     if (r.name != "step") continue;
     r.in_force = true;
@@ -195,7 +200,7 @@ void apply(const Setting& setting, scene::Scene& s) {
     if (!s.steered) r.what = trade::label(setting.dynamics);
     r.why = "measured against the converged motion, the cheapest that keeps to the accuracy";
     r.after = setting.dynamics.dt_s;
-    r.bound = s.accuracy.joint_error_rad;
+    r.bound = error_bound(setting, c.reference);
   }
   s.dynamics = setting.dynamics;
   s.planner.period_steps = setting.period_steps;

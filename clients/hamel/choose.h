@@ -44,10 +44,13 @@ Setting measure(const scene::Scene& scene, const Converged& reference, const tra
 /// time it usually takes, so that it is the same on every machine and in every process; wall times stand
 /// beside it.
 Choosing choose(const scene::Scene& scene, const trade::Watch& watch);
-/// True when a setting keeps to what was asked.
-bool meets(const scene::Accuracy& asked, const Setting& s) noexcept;
-/// The scene with a setting, and its entry "step" in Scene::reductions.
-void apply(const Setting& s, scene::Scene& scene);
+/// What no joint is off by at any time of the horizon: twice what was measured at the instants, for what lies
+/// between them, and the reference's own uncertainty [rad or m].
+double error_bound(const Setting& s, const Converged& reference) noexcept;
+/// True when a setting's bound keeps to what was asked.
+bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& reference) noexcept;
+/// The scene with the chosen setting, and its entry "step" in Scene::reductions.  Needs a choice.
+void apply(const Choosing& c, scene::Scene& scene);
 /// The same as overrides: "dynamics.tier=gauss" and so on.
 std::vector<std::string> overrides(const Setting& s);
 /// The clock, and no early end.

@@ -22,7 +22,7 @@ Checked<scene::Scene> load_chosen(runtime::RunOptions& o) {
   }
   spdlog::info("{}: chosen for the accuracy:{}", o.scene_path, said);
   scene = runtime::load(o);
-  if (scene) apply(*c.chosen, scene.value());
+  if (scene) apply(c, scene.value());
   return scene;
 }
 

@@ -99,7 +99,7 @@ Explained explain_scene(const scene::Scene& written, double seconds, const trade
   for (std::size_t k = 0; k < out.each.size(); ++k) out.each[k].without = variants[k + 2].cost;
   if (scene::wanted(written.reduce, written.reduce.step, false)) {
     out.choosing = choose(out.reduced, watch);
-    if (out.choosing->chosen) apply(*out.choosing->chosen, out.reduced);
+    if (out.choosing->chosen) apply(*out.choosing, out.reduced);
   }
   return out;
 }

@@ -80,13 +80,16 @@ void expect_equal(const scene::Scene& written) {
     EXPECT_EQ(x.reason, y.reason);
     EXPECT_EQ(x.contacts, y.contacts);
     EXPECT_EQ(x.pairs_in_range, y.pairs_in_range);
-    if (std::isfinite(x.clearance_m) || std::isfinite(y.clearance_m))
+    if (std::isfinite(x.clearance_m) || std::isfinite(y.clearance_m)) {
       EXPECT_NEAR(x.clearance_m, y.clearance_m, 100 * grown + 1e-12);
+    }
   }
   const bool same_arm = full.robot.chain.n() == exact.robot.chain.n() &&
                         exact.dynamics.space == scene::Space::se3 &&
                         full.robot.chain.gravity_W_mps2() == exact.robot.chain.gravity_W_mps2();
-  if (same_arm) EXPECT_EQ(a.same_commands, b.same_commands) << "obstacles left out leave every bit";
+  if (same_arm) {
+    EXPECT_EQ(a.same_commands, b.same_commands) << "obstacles left out leave every bit";
+  }
 }
 
 TEST(ExactReductions, LeaveEveryShippedSceneAsItIs) {
@@ -153,7 +156,9 @@ TEST(ExactReductions, HandThePlannerFewOfAThousand) {
   expect_equal(s);
   const scene::Scene exact = as(s, scene::Fidelity::exact);
   for (const scene::Reduction& r : exact.reductions)
-    if (r.name == "obstacles") EXPECT_LE(r.after, 30) << "of " << r.before;
+    if (r.name == "obstacles") {
+      EXPECT_LE(r.after, 30) << "of " << r.before;
+    }
 }
 
 }  // namespace

@@ -62,12 +62,13 @@ inline scene::Scene random_scene(Random& rng, bool planar, double locked) {
                  .robot = std::move(robot),
                  .q0 = q0,
                  .qd0 = Eigen::VectorXd::Zero(n),
-                 .goal = scene::Goal{.id = 1},
+                 .goal = scene::Goal{},
                  .dynamics = {.dt_s = 2e-3},
                  .planner = {.vmax_mps = 0.5, .amax = 20, .rho0_m = 0.2},
                  .perception = {},
                  .bus = {},
                  .duration_s = 0.4};
+  s.goal->id = 1;
   s.goal->X_WG.p = s.robot.chain.X_WB0().p + rng.vec3(0.7);
   s.locked = locks;
   const auto obstacles = static_cast<std::uint32_t>(rng.uniform(0, 40));

@@ -42,7 +42,9 @@ TEST_P(Reduced, FrozenJointsLeaveTheOthersTheirTorques) {
   rbd::inverse_dynamics(whole.robot.chain, q, qd, qdd, big, tau);
   rbd::inverse_dynamics(small.robot.chain, x, v, a, little, t);
   for (int i = 0, k = 0; i < n; ++i)
-    if (!at[static_cast<std::size_t>(i)]) EXPECT_NEAR(t[k++], tau[i], 1e-12 * (1 + tau.norm()));
+    if (!at[static_cast<std::size_t>(i)]) {
+      EXPECT_NEAR(t[k++], tau[i], 1e-12 * (1 + tau.norm()));
+    }
   rbd::positions(whole.robot.chain, q, big);
   rbd::positions(small.robot.chain, x, little);
   const lie::Pose e = rbd::tip(whole.robot.chain, big), f = rbd::tip(small.robot.chain, little);
@@ -72,10 +74,11 @@ TEST_P(Reduced, HeldJointsStayAndTheOthersMoveAsWithoutThem) {
     ASSERT_TRUE(b.step(y, tau).usable());
   }
   for (Eigen::Index i = 0, k = 0; i < x.q.size(); ++i) {
-    if (at[static_cast<std::size_t>(i)])
+    if (at[static_cast<std::size_t>(i)]) {
       EXPECT_EQ(x.q[i], held.q0[i]);
-    else
+    } else {
       EXPECT_NEAR(x.q[i], y.q[k++], 1e-11);
+    }
   }
 }
 
