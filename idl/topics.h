@@ -18,6 +18,9 @@ enum class Delivery : std::uint8_t {
 
 inline constexpr int kStreamDepth = 256;
 
+/// Samples of one key that a writer keeps and that wait for a reader.
+constexpr int depth_of(Delivery d) { return d == Delivery::latched ? 1 : kStreamDepth; }
+
 struct Topic {
   std::string_view name;
   std::string_view type;

@@ -60,11 +60,12 @@ struct Workshop {
   double near_m, far_m;                  // spheres' centres, from the shoulder
   double least_radius_m, most_radius_m;  // of spheres
   double start_clear_m, goal_clear_m;
+  double way_m;         // from start to goal, at least
   double base_clear_m;  // moving spheres stay so far from what cannot get out of their way
   double duration_s;
 };
-constexpr Workshop kPlanar{0.5, 3.6, 0.15, 0.35, 0.10, 0.03, 0.35, 15};
-constexpr Workshop kPanda{0.25, 0.85, 0.04, 0.12, 0.05, 0.02, 0.10, 12};
+constexpr Workshop kPlanar{0.5, 3.2, 0.20, 0.40, 0.10, 0.03, 1.0, 0.35, 15};
+constexpr Workshop kPanda{0.25, 0.80, 0.04, 0.11, 0.05, 0.02, 0.3, 0.10, 12};
 
 scene::Scene empty_scene(const scene::Robot& robot) {
   scene::Scene s{"", "", 1, robot, {}, {}, {}, true, {}, {}, {}, {}, 10, scene::StopRule::when_reached};
@@ -108,8 +109,11 @@ class Drawing {
       scene_.q0 = random_configuration(robot_.chain, dice_);
       const VectorXd q_goal = random_configuration(robot_.chain, dice_);
       if (!free_of_itself(scene_.q0) || !free_of_itself(q_goal)) continue;
+      rbd::positions(robot_.chain, scene_.q0, ws_);
+      const Vector3d tip = rbd::tip(robot_.chain, ws_).p;
       rbd::positions(robot_.chain, q_goal, ws_);
       scene_.goal->X_WG = rbd::tip(robot_.chain, ws_);
+      if ((scene_.goal->X_WG.p - tip).norm() < shop_.way_m) continue;
       if (draw_spheres(q_goal)) return std::move(scene_);
     }
   }

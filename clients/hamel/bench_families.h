@@ -40,9 +40,10 @@ Checked<BenchRobots> bench_robots(ArmModel model);
 /// scene, whatever else is run.
 ///
 /// Start and goal are random configurations whose clearance is at least 5 cm and 2 cm (planar 10 cm, 3 cm);
-/// the goal is the end effector's place there.  That a way exists between them is not proved.
-/// Moving spheres go straight on with 0.1 to 1 m/s; each passes a random place of the workspace within the
-/// first half of the run, none comes near the base, and none touches the start within half a second.
+/// the goal is the end effector's place there, at least 0.3 m (1 m) from the start.  That a way exists
+/// between them is not proved. Moving spheres go straight on with 0.1 to 1 m/s; each passes a random place of
+/// the workspace within the first half of the run, none comes near the base, and none touches the start
+/// within half a second.
 scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, ArmModel model, std::uint64_t seed,
                         std::size_t index);
 

@@ -91,8 +91,8 @@ class Figure {
     if (!out) return Problem{csv, "cannot be written"};
     for (const char* extension : {".svg", ".png"}) {
       const std::string picture = (folder_ / (name_ + extension)).string();
-      const std::string script = terminal(picture, width, height) + "set datafile separator ','\ncsv = '" +
-                                 csv + "'\nset grid\n" + body;
+      const std::string script = terminal(picture, width, height) +
+                                 "set datafile separator ','\ncsv = " + quoted(csv) + "\nset grid\n" + body;
       if (auto p = draw(script, picture)) return p;
     }
     return std::nullopt;

@@ -7,14 +7,21 @@
 namespace hamel::client {
 
 std::optional<Problem> check_picture_name(const std::string& path) {
+  if (path.find_first_of("\n\r") != std::string::npos) return Problem{path, "must not hold a line break"};
   if (path.ends_with(".svg") || path.ends_with(".png")) return std::nullopt;
   return Problem{path, "must end in .svg or .png"};
 }
 
+std::string quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? "''" : c == '\n' ? " " : std::string(1, c);
+  return out + "'";
+}
+
 std::string terminal(const std::string& path, int width, int height) {
   const bool png = path.ends_with(".png");
-  return fmt::format("set terminal {} noenhanced size {},{} {}\nset output '{}'\n", png ? "pngcairo" : "svg",
-                     width, height, png ? "" : "background 'white'", path);
+  return fmt::format("set terminal {} noenhanced size {},{} {}\nset output {}\n", png ? "pngcairo" : "svg",
+                     width, height, png ? "" : "background 'white'", quoted(path));
 }
 
 std::optional<Problem> draw(const std::string& script, const std::string& path) {

@@ -25,6 +25,8 @@ class Script {
 
 /// A problem unless `path` ends in .svg or .png.
 std::optional<Problem> check_picture_name(const std::string& path);
+/// As gnuplot takes it: in single quotes, those inside doubled.
+std::string quoted(const std::string& text);
 /// "set terminal" and "set output" for `path`.
 std::string terminal(const std::string& path, int width, int height);
 /// Runs gnuplot on `script`, which draws into `path`.

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -47,21 +49,22 @@ ordered_json json_of(const std::vector<wire::Field>& fields) {
 
 std::string seconds(std::uint64_t ns) { return fmt::format("{:.9f}", static_cast<double>(ns) * 1e-9); }
 
-/// Everything of a file in order, with channels' names; counts what is damaged on stderr.
+/// The messages that are asked for, in order, with their topics; what is damaged is said on stderr unless
+/// `quiet`.
 template <class OnMessage>
-int each_message(const char* verb, const LogArgs& args, OnMessage&& on_message) {
+int each_message(const char* verb, const LogArgs& args, OnMessage&& on_message, bool quiet = false) {
   auto reader = record::StreamReader::open(args.path);
   if (!reader) return runtime::complain(verb, {reader.error()});
   const Topic* wanted = args.topic.empty() ? nullptr : find_topic(args.topic);
   if (!args.topic.empty() && wanted == nullptr)
     return runtime::complain(verb, {{"--topic " + args.topic, "is no topic of hamel"}});
   std::map<std::uint16_t, std::string> topics;
-  bool damaged = false;
+  bool damaged = false, any = false;
   while (const auto item = reader.value().next()) {
     if (const auto* c = std::get_if<record::Channel>(&*item)) topics[c->id] = c->topic;
     if (const auto* d = std::get_if<record::Damage>(&*item)) {
       damaged = true;
-      fmt::print(stderr, "{}: {}: at byte {}: {}\n", verb, args.path, d->offset, d->what);
+      if (!quiet) fmt::print(stderr, "{}: {}: at byte {}: {}\n", verb, args.path, d->offset, d->what);
     }
     const auto* m = std::get_if<record::Message>(&*item);
     if (m == nullptr) continue;
@@ -70,9 +73,11 @@ int each_message(const char* verb, const LogArgs& args, OnMessage&& on_message) 
     if ((wanted != nullptr && name != wanted->name) || t_s < args.begin_s ||
         (args.end_s >= 0 && t_s > args.end_s))
       continue;
+    any = true;
     if (!on_message(name, *m)) break;
   }
-  return damaged ? runtime::kFailed : runtime::kDone;
+  if (!any && !quiet) fmt::print(stderr, "{}: {}: holds no such message\n", verb, args.path);
+  return damaged ? runtime::kFailed : any ? runtime::kDone : runtime::kNoData;
 }
 
 struct Contents {
@@ -176,37 +181,81 @@ int log_cat(const LogArgs& args) {
   });
 }
 
+namespace {
+
+/// The columns of a table: every field of every message, each new one behind its neighbour.
+class Columns {
+ public:
+  void add(const std::vector<wire::Field>& fields) {
+    std::size_t at = 0;
+    for (const wire::Field& f : fields) {
+      if (std::holds_alternative<wire::EmptyList>(f.value)) continue;
+      if (const auto known = place_.find(f.path); known != place_.end()) {
+        at = known->second + 1;
+        continue;
+      }
+      names_.insert(names_.begin() + static_cast<std::ptrdiff_t>(at), f.path);
+      place_.clear();
+      for (std::size_t i = 0; i < names_.size(); ++i) place_[names_[i]] = i;
+      ++at;
+    }
+  }
+  std::string header() const {
+    std::string line = "log_time_s";
+    for (const std::string& name : names_) line += "," + name;
+    return line;
+  }
+  std::string row(std::uint64_t time, const std::vector<wire::Field>& fields) const {
+    std::vector<std::string> cells(names_.size());
+    for (const wire::Field& f : fields)
+      if (const auto at = place_.find(f.path); at != place_.end()) cells[at->second] = cell(f);
+    std::string line = seconds(time);
+    for (const std::string& c : cells) line += "," + c;
+    return line;
+  }
+
+ private:
+  static std::string cell(const wire::Field& f) {
+    if (const auto* d = std::get_if<double>(&f.value); d && !std::isfinite(*d)) return fmt::format("{}", *d);
+    if (const auto* text = std::get_if<std::string>(&f.value)) {
+      std::string out = "\"";
+      for (const char c : *text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+      return out + "\"";
+    }
+    return json_of(f).dump();
+  }
+  std::vector<std::string> names_;
+  std::map<std::string, std::size_t> place_;
+};
+
+}  // namespace
+
 int log_csv(const LogArgs& args) {
+  const char* verb = "hamel log csv";
+  const auto decoded = [](const std::string& name, const record::Message& m, auto&& use) {
+    const Topic* topic = find_topic(name);
+    if (topic == nullptr) return;
+    if (const auto fields = wire::fields(*topic, m.data)) use(fields.value());
+  };
+  Columns columns;
+  const auto gather = [&](const std::string& name, const record::Message& m) {
+    decoded(name, m, [&](const auto& fields) { columns.add(fields); });
+    return true;
+  };
+  if (const int code = each_message(verb, args, gather, true); code == runtime::kBadInput) return code;
   std::FILE* out = args.out_path.empty() ? stdout : std::fopen(args.out_path.c_str(), "w");
-  if (out == nullptr) return runtime::complain("hamel log csv", {{args.out_path, "cannot write"}});
-  std::vector<std::string> header;
-  const int code =
-      each_message("hamel log csv", args, [&](const std::string& name, const record::Message& m) {
-        const Topic* topic = find_topic(name);
-        const auto fields = topic ? wire::fields(*topic, m.data)
-                                  : Result<std::vector<wire::Field>, wire::DecodeError>(wire::DecodeError{});
-        if (!fields) return true;
-        std::map<std::string, std::string> cells;
-        if (header.empty()) {
-          std::string line = "log_time_s";
-          for (const auto& f : fields.value()) line += "," + header.emplace_back(f.path);
-          fmt::print(out, "{}\n", line);
-        }
-        for (const auto& f : fields.value())
-          cells[f.path] = std::holds_alternative<wire::EmptyList>(f.value)
-                              ? ""
-                              : json_of(f).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-        std::string line = seconds(m.log_time);
-        for (const std::string& column : header)
-          line += "," + (cells[column] == "null" ? "inf" : cells[column]);
-        fmt::print(out, "{}\n", line);
-        return std::ferror(out) == 0;
-      });
+  if (out == nullptr)
+    return runtime::complain(verb, {{args.out_path, std::string("cannot write: ") + std::strerror(errno)}});
+  fmt::print(out, "{}\n", columns.header());
+  const int code = each_message(verb, args, [&](const std::string& name, const record::Message& m) {
+    decoded(name, m, [&](const auto& fields) { fmt::print(out, "{}\n", columns.row(m.log_time, fields)); });
+    return std::ferror(out) == 0;
+  });
   const bool bad = std::fflush(out) != 0 || std::ferror(out) != 0;
   if (out != stdout) std::fclose(out);
   if (bad)
     return runtime::complain(
-        "hamel log csv", {{args.out_path.empty() ? "stdout" : args.out_path, "could not be written whole"}});
+        verb, {{args.out_path.empty() ? "stdout" : args.out_path, "could not be written whole"}});
   return code;
 }
 

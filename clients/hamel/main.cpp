@@ -1,10 +1,14 @@
 /// hamel: the command line.
 
+#include <cerrno>
+#include <system_error>
+
 #include "clients/hamel/batch_verb.h"
 #include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/explain.h"
 #include "clients/hamel/figures.h"
+#include "clients/hamel/network_verbs.h"
 #include "clients/hamel/plot.h"
 #include "clients/hamel/record.h"
 #include "clients/hamel/replay.h"
@@ -14,6 +18,10 @@
 using namespace hamel;
 
 namespace {
+
+void add_overrides(CLI::App& app, std::vector<std::string>& overrides, const char* help) {
+  app.add_option("--set", overrides, help)->type_name("PATH=VALUE")->allow_extra_args(false);
+}
 
 void add_run_like(CLI::App& app, client::RunArgs& a) {
   runtime::add_run_options(app, a.run);
@@ -39,9 +47,7 @@ class RecordVerbs {
         ->check(CLI::PositiveNumber);
     record_->add_option("--scene", record_args_.scene_path,
                         "scene of the run, kept in the recording for replays");
-    record_->add_option("--set", record_args_.overrides, "overrides of the run")
-        ->type_name("PATH=VALUE")
-        ->allow_extra_args(false);
+    add_overrides(*record_, record_args_.overrides, "overrides of the run");
     runtime::add_bus_options(*record_, record_args_.bus);
 
     log_ = app.add_subcommand("log", "look into a recording");
@@ -99,16 +105,16 @@ class RecordVerbs {
         ->type_name("FIELD=NUMBER")
         ->allow_extra_args(false);
     replay_->add_option("--scene", replay_args_.scene_path, "scene to use instead of the recorded one");
-    replay_->add_option("--set", replay_args_.overrides, "override a field of the scene")
-        ->type_name("PATH=VALUE")
-        ->allow_extra_args(false);
+    add_overrides(*replay_, replay_args_.overrides, "override a field of the scene");
     replay_->add_flag("--json", replay_args_.json, "one JSON object");
   }
 
   void add_play(CLI::App& app) {
     play_ =
         app.add_subcommand("play", "put recorded messages on the bus again, byte for byte, at their times");
-    play_->add_option("file", play_args_.path, "recording")->required()->type_name("FILE");
+    play_->add_option("file", play_args_.path, "recording (.mcap), or obstacle stream (.csv)")
+        ->required()
+        ->type_name("FILE");
     play_->add_option("--topic", play_args_.topics, "obstacles, clock, ...; repeat")
         ->allow_extra_args(false)
         ->capture_default_str();
@@ -118,6 +124,11 @@ class RecordVerbs {
     play_->add_option("--start", play_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
     play_->add_option("--until", play_args_.end_s, "up to this time of the run")->type_name("SECONDS");
     play_->add_flag("--loop", play_args_.loop, "begin anew at the end, until Ctrl-C");
+    play_->add_flag("--control", play_args_.control,
+                    "obey standard input: pause, resume, step, quit, or the keys space . q");
+    play_->add_flag("--paused", play_args_.paused, "with --control: begin paused");
+    play_->add_option("--arm", play_args_.arm, "arm whose perception a CSV stands for")
+        ->capture_default_str();
     runtime::add_bus_options(*play_, play_args_.bus);
   }
 
@@ -127,13 +138,26 @@ class RecordVerbs {
   client::LogArgs log_args_;
   CLI::App *record_, *play_, *replay_, *log_, *info_, *cat_, *csv_, *recover_;
 };
+
+CLI::App* add_plot(CLI::App& app, client::PlotArgs& a) {
+  auto* plot = app.add_subcommand("plot", "draw a run (needs gnuplot)");
+  plot->add_option("file", a.path, "recording (.mcap), or what --csv wrote")->required()->type_name("FILE");
+  plot->add_option("-o,--output", a.out_path, "picture, .svg or .png")->required()->type_name("FILE");
+  plot->add_option("--kind", a.kinds, "path, clearance, energy, iterations, latencies or all; repeat")
+      ->check(CLI::IsMember({"path", "clearance", "energy", "iterations", "latencies", "all"}))
+      ->allow_extra_args(false);
+  plot->add_option("--scene", a.scene_path,
+                   "scene of a CSV: draws arm, obstacles and target too; of a recording: instead of its own")
+      ->type_name("SCENE");
+  add_overrides(*plot, a.overrides, "overrides the run was made with");
+  return plot;
+}
+
 CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
   auto* trade =
       app.add_subcommand("trade", "measure accuracy against cost of every tier on a scene's free motion");
   trade->add_option("scene", a.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
-  trade->add_option("--set", a.overrides, "override a field of the scene; repeat")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  add_overrides(*trade, a.overrides, "override a field of the scene; repeat");
   trade->add_option("--horizon", a.horizon_s, "seconds of motion instead of the scene's")
       ->check(CLI::PositiveNumber)
       ->type_name("SECONDS");
@@ -160,9 +184,7 @@ CLI::App* add_figures(CLI::App& app, client::FiguresArgs& a) {
   figures->add_option("scene", a.scene_path, "scene file; the paper's is three_link_swing.textproto")
       ->required()
       ->type_name("SCENE");
-  figures->add_option("--set", a.overrides, "override a field of the scene; repeat")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  add_overrides(*figures, a.overrides, "override a field of the scene; repeat");
   figures->add_option("-o,--output", a.folder, "folder for csv, svg and png")->required()->type_name("DIR");
   return figures;
 }
@@ -249,13 +271,7 @@ int verbs(int argc, char** argv) {
   runtime::add_bus_options(*status, status_args.bus);
 
   client::PlotArgs plot_args;
-  auto* plot = app.add_subcommand("plot", "draw a run from the file that --csv wrote (needs gnuplot)");
-  plot->add_option("scene", plot_args.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
-  plot->add_option("csv", plot_args.csv_path, "written by --csv of that scene")->required()->type_name("CSV");
-  plot->add_option("-o,--output", plot_args.out_path, "picture, .svg or .png")->required()->type_name("FILE");
-  plot->add_option("--set", plot_args.overrides, "overrides the run was made with")
-      ->type_name("PATH=VALUE")
-      ->allow_extra_args(false);
+  const auto* plot = add_plot(app, plot_args);
 
   client::TradeArgs trade_args;
   const auto* trade = add_trade(app, trade_args);
@@ -269,10 +285,12 @@ int verbs(int argc, char** argv) {
 
   RecordVerbs recordings(app);
   client::BenchVerb bench(app);
+  const client::NetworkVerbs network(app);  // adds to bench
 
   if (const auto code = runtime::parse(app, argc, argv)) return *code;
   if (const auto code = recordings.run()) return *code;
   if (const auto code = bench.run()) return *code;
+  if (const auto code = network.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (figures->parsed()) return client::figures(figures_args);
   if (explain->parsed()) return client::explain(explain_args);
@@ -295,8 +313,11 @@ int verbs(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     const int code = verbs(argc, argv);
-    if (std::fflush(stdout) == 0) return code;
+    if (std::fflush(stdout) == 0 || errno == EPIPE) return code;
     std::fputs("hamel: cannot write to standard output\n", stderr);
+  } catch (const std::system_error& e) {
+    if (e.code() == std::errc::broken_pipe) return runtime::kDone;  // the reader has had enough
+    std::fputs((std::string("hamel: ") + e.what() + "\n").c_str(), stderr);
   } catch (const std::exception& e) {
     std::fputs("hamel: ", stderr);
     std::fputs(e.what(), stderr);

@@ -18,6 +18,7 @@ namespace {
 constexpr auto kPatience = 20s;     // nothing heard for so long: the run is lost
 constexpr auto kLastWords = 500ms;  // after the final summary, for the last report
 constexpr std::size_t kRowsWaiting = 200;
+constexpr std::size_t kMostOutages = 1000;
 }  // namespace
 
 Result<std::unique_ptr<CsvWriter>, Problem> CsvWriter::open(const std::string& path, int n) {
@@ -72,7 +73,7 @@ Monitor::Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, s
 bool Monitor::poll(Time now) {
   const auto before = states_ + reports_;
   take_reports();
-  take_states();
+  take_states(now);
   wire::RunSummary s;
   while (summary_in_.take(s)) {
     if (s.arm != scene_.arm) continue;
@@ -105,7 +106,28 @@ runtime::Clock::time_point Monitor::due() const {
                   summary_ && summary_->final_summary ? final_heard_ + kLastWords : last_shown_ + 250ms);
 }
 
-void Monitor::take_states() {
+void Monitor::outage(const char* service, double t_s, double length_s) {
+  if (outages_.size() < kMostOutages)
+    outages_.push_back({service, t_s, length_s});
+  else
+    ++outages_more_;
+}
+
+/// Real time: who fell silent for longer than its topic allows, and how long.  Called with each new state.
+void Monitor::follow(const wire::ArmState& s, Time now) {
+  if (pace_ != scene::Pace::realtime) return;
+  if (state_ && now - last_state_ > topics::kState.stale)
+    outage("dynamics", s.t_s, std::chrono::duration<double>(now - last_state_).count());
+  last_state_ = now;
+  const bool silent = s.validity == wire::Validity::command_stale;
+  if (silent && !silent_since_s_) silent_since_s_ = s.t_s;
+  if (!silent && silent_since_s_) {
+    outage("planner", *silent_since_s_, s.t_s - *silent_since_s_);
+    silent_since_s_.reset();
+  }
+}
+
+void Monitor::take_states(Time now) {
   wire::ArmState s;
   while (state_in_.take(s)) {
     if (s.arm != scene_.arm || s.position.size() != scene_.robot.chain.n()) continue;
@@ -113,6 +135,7 @@ void Monitor::take_states() {
     if (repeated) continue;
     if (state_ && s.incarnation == state_->incarnation) rows_lost_ += s.step - state_->step - 1;
     ++states_;
+    follow(s, now);
     state_ = s;
     if (csv_) rows_.push_back(s);
   }
@@ -125,6 +148,12 @@ void Monitor::take_reports() {
     // When the run is over the planner hears no more states and says so: that is not how the run went.
     if (summary_ && summary_->final_summary && r.reason == wire::Reason::stale_state) continue;
     ++reports_;
+    const bool blind = r.state == wire::PlannerState::unsafe && r.reason == wire::Reason::stale_obstacles;
+    if (blind && !blind_since_s_) blind_since_s_ = r.t_s;
+    if (!blind && blind_since_s_) {
+      if (report_) outage("perception", *blind_since_s_, r.t_s - *blind_since_s_);
+      blind_since_s_.reset();
+    }
     clearance_min_m_ = std::min(clearance_min_m_, r.clearance_min_m);
     contacts_ = std::max(contacts_, r.contacts);
     report_ = std::move(r);
@@ -209,6 +238,9 @@ Outcome Monitor::outcome(bool interrupted) {
   o.contacts = contacts_;
   o.min_clearance_m = clearance_min_m_;
   o.rows_lost = rows_lost_;
+  o.restarts = restarts_;
+  o.outages = outages_;
+  o.outages_more = outages_more_;
   if (report_) {
     o.detail = report_->detail;
     o.time_to_goal_s = report_->time_to_goal_s;

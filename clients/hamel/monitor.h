@@ -25,6 +25,14 @@ struct Outcome {
   wire::RunSummary summary;
   double t_s = 0, wall_s = 0;
   std::uint64_t rows_lost = 0;  ///< states the monitor did not see
+  int restarts = 0;
+  struct Outage {
+    const char* service = "";
+    double t_s = 0;       ///< the run's time when it was noticed
+    double length_s = 0;  ///< dynamics: of wall time; the others: of the run's
+  };
+  std::vector<Outage> outages;  ///< real time: in their order; the first kMostOutages
+  std::uint64_t outages_more = 0;
 };
 
 class CsvWriter {
@@ -62,8 +70,10 @@ class Monitor final : public runtime::Service {
 
  private:
   using Time = runtime::Clock::time_point;
-  void take_states();
+  void take_states(Time now);
   void take_reports();
+  void follow(const wire::ArmState& s, Time now);
+  void outage(const char* service, double t_s, double length_s);
   void write_rows(bool all);
   void show(Time now);
 
@@ -84,6 +94,10 @@ class Monitor final : public runtime::Service {
   std::deque<wire::ArmState> rows_;
   std::uint64_t rows_lost_ = 0;
   int restarts_ = 0;
+  std::vector<Outcome::Outage> outages_;
+  std::uint64_t outages_more_ = 0;
+  std::optional<double> silent_since_s_, blind_since_s_;  ///< the planner; its obstacles
+  Time last_state_{};
   Time began_{}, last_heard_{}, final_heard_{}, last_shown_{}, ended_{};
   double shown_t_s_ = 0;
   std::uint64_t states_ = 0, reports_ = 0, shown_states_ = 0;

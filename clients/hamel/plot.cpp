@@ -1,30 +1,22 @@
 #include "clients/hamel/plot.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
-#include <map>
-#include <sstream>
 
+#include "clients/hamel/course.h"
 #include "clients/hamel/gnuplot.h"
+#include "clients/hamel/outline.h"
 #include "common/rbd/rbd.h"
 #include "common/runtime/options.h"
-#include "services/perception/core/source.h"
 
 namespace hamel::client {
 
 namespace {
 
 constexpr int kSnapshots = 12;  // arms drawn along the run
-constexpr std::size_t kPathPoints = 800;
-
-struct Row {
-  double t_s = 0, clearance_m = 0, energy_J = 0;
-  Eigen::VectorXd q;
-  Eigen::Vector3d tip_m;
-};
+constexpr const char* kDots = "points pt 7 ps 0.2";
 
 /// A plane of the world that is drawn: its two axes.
 struct View {
@@ -33,213 +25,199 @@ struct View {
   const char* label_up;
 };
 
-Result<std::vector<Row>, Problem> read_rows(const std::string& path, int n) {
-  std::ifstream in(path);
-  if (!in) return Problem{path, "cannot read"};
-  std::string line;
-  std::getline(in, line);
-  std::map<std::string, std::size_t> column;
-  std::istringstream header(line);
-  for (std::string name; std::getline(header, name, ',');) column.emplace(name, column.size());
-  const auto at = [&](const std::string& name) {
-    return column.contains(name) ? static_cast<long>(column[name]) : -1;
-  };
-  for (const std::string& name :
-       {std::string("t_s"), std::string("q1"), fmt::format("q{}", n), std::string("ee_x_m"),
-        std::string("ee_z_m"), std::string("clearance_m"), std::string("energy_J")})
-    if (at(name) < 0)
-      return Problem{path + ":1", "has no column " + name + ": written by --csv of this scene?"};
-  std::vector<Row> rows;
-  std::vector<double> v;
-  for (int number = 2; std::getline(in, line); ++number) {
-    v.clear();
-    std::istringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) v.push_back(std::strtod(cell.c_str(), nullptr));
-    if (v.size() != column.size())
-      return Problem{fmt::format("{}:{}", path, number),
-                     fmt::format("has {} cells, the header {}", v.size(), column.size())};
-    Row r;
-    r.t_s = v[column["t_s"]];
-    r.clearance_m = v[column["clearance_m"]];
-    r.energy_J = v[column["energy_J"]];
-    r.q = Eigen::Map<Eigen::VectorXd>(v.data() + column["q1"], n);
-    r.tip_m = Eigen::Map<Eigen::Vector3d>(v.data() + column["ee_x_m"]);
-    rows.push_back(std::move(r));
-  }
-  if (rows.empty()) return Problem{path, "has no rows"};
-  return rows;
+bool has_target(const Course& c) {
+  return c.scene && c.scene->goal && c.scene->goal->kind != scene::GoalKind::joints;
 }
 
-/// Corners and rims of a solid, enough for an outline; world frame.
-std::vector<Eigen::Vector3d> outline_points(const geometry::Obstacle& o) {
-  std::vector<Eigen::Vector3d> points;
-  const auto& d = o.shape.dims_m;
-  const auto add = [&](double x, double y, double z) { points.push_back(o.X_WO * Eigen::Vector3d(x, y, z)); };
-  const auto ball = [&](double radius, double z) {
-    for (int i = 0; i < 24; ++i)
-      for (int j = -5; j <= 5; ++j) {
-        const double a = i * M_PI / 12, b = j * M_PI / 10;
-        add(radius * std::cos(a) * std::cos(b), radius * std::sin(a) * std::cos(b), z + radius * std::sin(b));
+/// One script: data blocks first, then a panel after the other.
+class Picture {
+ public:
+  Picture(const Course& course, std::vector<std::string> kinds) : c_(course), kinds_(std::move(kinds)) {
+    const auto flat = [&](int axis) {
+      return std::all_of(c_.rows.begin(), c_.rows.end(), [&](const Row& r) {
+        return !(std::abs(r.tip_m[axis] - c_.rows[0].tip_m[axis]) > 1e-9);
+      });
+    };
+    if (!flat(0) || !flat(1)) views_.push_back({0, 1, "x", "y"});
+    if (!flat(2)) views_.push_back({flat(0) ? 1 : 0, 2, flat(0) ? "y" : "x", "z"});
+  }
+
+  std::string script(const std::string& out_path) {
+    const bool path = std::count(kinds_.begin(), kinds_.end(), "path") > 0;
+    const std::size_t panels = kinds_.size() + (path ? views_.size() - 1 : 0);
+    const std::size_t columns = std::min<std::size_t>(panels, 3), rows = (panels + columns - 1) / columns;
+    s_.add("{}", terminal(out_path, 480 * static_cast<int>(columns), 60 + 480 * static_cast<int>(rows)));
+    add_rows();
+    if (path) add_bodies();
+    s_.add("set multiplot layout {},{} title {}\n", rows, columns, quoted(c_.name));
+    for (const std::string& kind : kinds_) {
+      if (kind == "path")
+        for (std::size_t i = 0; i < views_.size(); ++i) path_panel(i);
+      else
+        panel(kind);
+    }
+    s_.add("unset multiplot\n");
+    return s_.str();
+  }
+
+ private:
+  /// 1 t, 2-4 end effector, 5 clearance, 6 error, 7 energy, 8 iterations, 9-11 latencies in ms, 12.. bodies.
+  void add_rows() {
+    std::optional<rbd::Workspace> ws;
+    if (c_.scene) ws.emplace(c_.scene->robot.chain);
+    s_.add("$rows << EOD\n");
+    for (const Row& r : c_.rows) {
+      for (const double v :
+           {r.t_s, r.tip_m.x(), r.tip_m.y(), r.tip_m.z(), r.clearance_m, r.error_m, r.energy_J, r.iterations,
+            r.planner_s * 1e3, r.command_age_s * 1e3, r.obstacle_age_s * 1e3})
+        number(v);
+      if (ws) {
+        rbd::positions(c_.scene->robot.chain, r.q, *ws);
+        for (const auto& X : ws->X_WB)
+          for (const double v : X.p) number(v);
       }
-  };
-  switch (o.shape.kind) {
-    case geometry::ShapeKind::sphere:
-      ball(d[0], 0);
-      break;
-    case geometry::ShapeKind::capsule:
-      ball(d[0], d[1] / 2), ball(d[0], -d[1] / 2);
-      break;
-    case geometry::ShapeKind::cylinder:
-      for (int i = 0; i < 24; ++i)
-        for (const double z : {-d[1] / 2, d[1] / 2})
-          add(d[0] * std::cos(i * M_PI / 12), d[0] * std::sin(i * M_PI / 12), z);
-      break;
-    case geometry::ShapeKind::box:
-      for (const double x : {-0.5, 0.5})
-        for (const double y : {-0.5, 0.5})
-          for (const double z : {-0.5, 0.5}) add(x * d[0], y * d[1], z * d[2]);
-      break;
-    case geometry::ShapeKind::half_space:
-      break;  // fills the picture: not drawn
-  }
-  return points;
-}
-
-using Point = std::pair<double, double>;
-
-/// Convex hull, counter-clockwise (monotone chain).
-std::vector<Point> hull(std::vector<Point> p) {
-  std::sort(p.begin(), p.end());
-  const auto cross = [](const Point& o, const Point& a, const Point& b) {
-    return (a.first - o.first) * (b.second - o.second) - (a.second - o.second) * (b.first - o.first);
-  };
-  std::vector<Point> h;
-  for (int pass = 0; pass < 2; ++pass) {
-    const std::size_t base = h.size();
-    for (const Point& q : p) {
-      while (h.size() >= base + 2 && cross(h[h.size() - 2], h.back(), q) <= 0) h.pop_back();
-      h.push_back(q);
+      s_.add("\n");
     }
-    if (!h.empty()) h.pop_back();
-    std::reverse(p.begin(), p.end());
+    s_.add("EOD\n");
   }
-  return h;
-}
-
-void add_arms(Script& s, const scene::Scene& scene, const std::vector<Row>& rows, const View& v,
-              const std::string& block) {
-  rbd::Workspace ws(scene.robot.chain);
-  s.add("${} << EOD\n", block);
-  for (int k = 0; k <= kSnapshots; ++k) {
-    // More pictures early, where the arm moves, than late, where it rests.
-    const double part = std::pow(static_cast<double>(k) / kSnapshots, 3);
-    const Row& r = rows[static_cast<std::size_t>(part * static_cast<double>(rows.size() - 1))];
-    rbd::positions(scene.robot.chain, r.q, ws);
-    const auto& base = scene.robot.chain.X_WB0().p;
-    s.add("{} {}\n", base[v.across], base[v.up]);
-    for (const auto& X : ws.X_WB) s.add("{} {}\n", X.p[v.across], X.p[v.up]);
-    s.add("{} {}\n\n", r.tip_m[v.across], r.tip_m[v.up]);
+  void number(double v) {
+    if (std::isfinite(v))
+      s_.add("{:.7g} ", v);
+    else
+      s_.add("NaN ");
   }
-  s.add("EOD\n");
-}
 
-void add_obstacles(Script& s, const perception::Source& source, double end_s, double grow_m, const View& v,
-                   const std::string& block) {
-  std::vector<geometry::Obstacle> at;
-  s.add("${} << EOD\n", block);
-  const int times = source.is_static() ? 1 : 5;
-  for (int k = 0; k < times; ++k) {
-    source.at(times == 1 ? 0 : end_s * k / (times - 1), at);
-    for (auto o : at) {
-      o.shape.dims_m[0] += grow_m;
-      std::vector<Point> flat;
-      for (const auto& p : outline_points(o)) flat.emplace_back(p[v.across], p[v.up]);
-      if (flat.empty()) continue;
-      auto h = hull(std::move(flat));
-      h.push_back(h.front());
-      for (const auto& [x, y] : h) s.add("{} {}\n", x, y);
-      s.add("\n");
+  void add_bodies() {
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      if (c_.scene) add_arms(i);
+      add_outlines(i, 0, "solid");
+      if (c_.scene) add_outlines(i, c_.scene->planner.rho0_m, "reach");
     }
   }
-  s.add("EOD\n");
-}
+  void add_arms(std::size_t i) {
+    const View& v = views_[i];
+    const model::Chain& chain = c_.scene->robot.chain;
+    rbd::Workspace ws(chain);
+    s_.add("$arms{} << EOD\n", i);
+    for (int k = 0; k <= kSnapshots; ++k) {
+      // More pictures early, where the arm moves, than late, where it rests.
+      const double part = std::pow(static_cast<double>(k) / kSnapshots, 3);
+      const Row& r = c_.rows[static_cast<std::size_t>(part * static_cast<double>(c_.rows.size() - 1))];
+      rbd::positions(chain, r.q, ws);
+      const auto& base = chain.X_WB0().p;
+      s_.add("{} {}\n", base[v.across], base[v.up]);
+      for (const auto& X : ws.X_WB) s_.add("{} {}\n", X.p[v.across], X.p[v.up]);
+      s_.add("{} {}\n\n", r.tip_m[v.across], r.tip_m[v.up]);
+    }
+    s_.add("EOD\n");
+  }
+  /// gnuplot complains about a block without points: has_outlines_ tells whether to draw it.
+  void add_outlines(std::size_t i, double grow_m, const char* block) {
+    s_.add("${}{} << EOD\n", block, i);
+    for (const auto& set : c_.obstacles)
+      for (const auto& o : set) {
+        const auto points = outline(o, grow_m, views_[i].across, views_[i].up);
+        has_outlines_ |= !points.empty();
+        for (const auto& [x, y] : points) s_.add("{} {}\n", x, y);
+        s_.add("\n");
+      }
+    s_.add("EOD\n");
+  }
 
-/// gnuplot draws nothing of a block without points, but complains: an empty block is left out.
-std::string script(const PlotArgs& args, const scene::Scene& scene, const std::vector<Row>& rows,
-                   const perception::Source& source) {
-  const bool flat = std::all_of(rows.begin(), rows.end(), [&](const Row& r) {
-    return std::abs(r.tip_m.z() - rows[0].tip_m.z()) < 1e-9;
-  });
-  std::vector<View> views{{0, 1, "x", "y"}};
-  if (!flat) views.push_back({0, 2, "x", "z"});
-  std::vector<geometry::Obstacle> first;
-  source.at(0, first);
+  void path_panel(std::size_t i) {
+    const View& v = views_[i];
+    s_.add(
+        "set size ratio -1\nset yrange [*:*]\nset key outside bottom center horizontal\nset xlabel '{} "
+        "[m]'\nset ylabel '{} [m]'\nplot ",
+        v.label_across, v.label_up);
+    if (has_outlines_ && c_.scene) s_.add("$reach{} with lines dt 3 lc rgb '#999999' title 'influence', ", i);
+    if (has_outlines_) s_.add("$solid{} with filledcurves fc rgb '#cc6644' title 'obstacle', ", i);
+    if (c_.scene) {
+      s_.add("$arms{} with linespoints pt 7 ps 0.3 lc rgb '#8899bb' title 'arm', ", i);
+      // The first body turns in its place.
+      for (int k = 1; k < c_.scene->robot.chain.n(); ++k)
+        s_.add("$rows using {}:{} with lines lc rgb '#aaccaa' {}, ", 12 + 3 * k + v.across, 12 + 3 * k + v.up,
+               k == 1 ? "title 'links'" : "notitle");
+    }
+    s_.add("$rows using {}:{} with lines lw 2 lc rgb '#114488' title 'end effector'", v.across + 2, v.up + 2);
+    if (has_target(c_))
+      s_.add(", '-' with points pt 2 ps 1.5 lw 2 lc rgb '#228833' title 'target'\n{} {}\ne",
+             c_.scene->goal->X_WG.p[v.across], c_.scene->goal->X_WG.p[v.up]);
+    s_.add("\n");
+  }
 
-  Script s;
-  s.add("{}", terminal(args.out_path, 480 * static_cast<int>(views.size() + 1), 540));
-  s.add("$path << EOD\n");
-  const std::size_t stride = std::max<std::size_t>(1, rows.size() / kPathPoints);
-  for (std::size_t i = 0; i < rows.size(); i += stride) {
-    const Row& r = rows[i];
-    const double error = scene.goal && scene.goal->kind != scene::GoalKind::joints
-                             ? (r.tip_m - scene.goal->X_WG.p).norm()
-                             : NAN;
-    s.add("{} {} {} {} {} {} {}\n", r.tip_m.x(), r.tip_m.y(), r.tip_m.z(), r.t_s, r.clearance_m, error,
-          r.energy_J);
+  bool any(double Row::*member) const {
+    return std::any_of(c_.rows.begin(), c_.rows.end(),
+                       [&](const Row& r) { return std::isfinite(r.*member); });
   }
-  s.add("EOD\n");
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    add_arms(s, scene, rows, views[i], fmt::format("arms{}", i));
-    if (first.empty()) continue;
-    add_obstacles(s, source, rows.back().t_s, 0, views[i], fmt::format("solid{}", i));
-    add_obstacles(s, source, rows.back().t_s, scene.planner.rho0_m, views[i], fmt::format("reach{}", i));
+  void panel(const std::string& kind) {
+    s_.add("set size noratio\nset xlabel 't [s]'\nset yrange [*:*]\nset key outside top center vertical\n");
+    if (kind == "clearance") {
+      s_.add("set ylabel '[m]'\nplot 0 lc rgb '#888888' notitle");
+      line(any(&Row::error_m), 6, "#228833", "distance to target");
+      line(any(&Row::clearance_m), 5, "#cc6644", "clearance");
+    } else if (kind == "energy") {
+      s_.add(
+          "set ylabel 'energy - energy(0) [J]'\nplot $rows using 1:($7-({:.17g})) with lines lc rgb "
+          "'#114488' notitle",
+          c_.rows[0].energy_J);
+    } else if (kind == "iterations") {
+      s_.add(
+          "set ylabel 'iterations of a step, at most'\nset yrange [0:*]\nset offsets 0,0,0.5,0\n"
+          "plot $rows using 1:8 with steps lc rgb '#114488' notitle");
+    } else {
+      s_.add("set ylabel '[ms]'\nset logscale y\nset yrange [1e-3:*]\nplot NaN notitle");
+      line(any(&Row::planner_s), 9, "#114488", "planner, wall time of a cycle", kDots);
+      line(any(&Row::command_age_s), 10, "#cc6644", "command, age when applied", kDots);
+      line(any(&Row::obstacle_age_s), 11, "#228833", "obstacles, age when used", kDots);
+    }
+    s_.add("\nunset logscale y\nset offsets 0,0,0,0\n");
   }
-  s.add("set multiplot layout 1,{} title '{}'\nset key outside bottom center horizontal\n", views.size() + 1,
-        scene.name);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const View& v = views[i];
-    s.add("set size ratio -1\nset xlabel '{} [m]'\nset ylabel '{} [m]'\nplot ", v.label_across, v.label_up);
-    if (!first.empty())
-      s.add(
-          "$reach{} with lines dt 3 lc rgb '#999999' title 'influence', $solid{} with filledcurves fc rgb "
-          "'#cc6644' title 'obstacle', ",
-          i, i);
-    s.add("$arms{} with linespoints pt 7 ps 0.3 lc rgb '#8899bb' title 'arm', ", i);
-    s.add("$path using {}:{} with lines lw 2 lc rgb '#114488' title 'end effector'", v.across + 1, v.up + 1);
-    if (scene.goal && scene.goal->kind != scene::GoalKind::joints)
-      s.add(", '-' with points pt 2 ps 1.5 lw 2 lc rgb '#228833' title 'target'\n{} {}\ne",
-            scene.goal->X_WG.p[v.across], scene.goal->X_WG.p[v.up]);
-    s.add("\n");
+  void line(bool there, int column, const char* color, const char* title, const char* style = "lines") {
+    if (there) s_.add(", $rows using 1:{} with {} lc rgb '{}' title '{}'", column, style, color, title);
   }
-  s.add("set size noratio\nset xlabel 't [s]'\n");
-  if (scene.steered)
-    s.add(
-        "set ylabel '[m]'\nset yrange [0:*]\nplot $path using 4:6 with lines lw 2 lc rgb '#228833' title "
-        "'distance to target', "
-        "$path using 4:5 with lines lw 2 lc rgb '#cc6644' title 'clearance'\n");
-  else
-    s.add(
-        "set ylabel 'energy - energy(0) [J]'\nplot $path using 4:($7-({})) with lines lc rgb '#114488' "
-        "notitle\n",
-        rows[0].energy_J);
-  s.add("unset multiplot\n");
-  return s.str();
+
+  const Course& c_;
+  const std::vector<std::string> kinds_;
+  std::vector<View> views_;
+  bool has_outlines_ = false;
+  Script s_;
+};
+
+/// The panels asked for, or those that suit the run; a problem where the file does not hold what they show.
+Result<std::vector<std::string>, Problem> panels(const PlotArgs& args, const Course& c) {
+  const auto holds = [&](double Row::*member) {
+    return std::any_of(c.rows.begin(), c.rows.end(), [&](const Row& r) { return std::isfinite(r.*member); });
+  };
+  const bool latencies = holds(&Row::planner_s) || holds(&Row::command_age_s);
+  const bool clearance = holds(&Row::clearance_m) || holds(&Row::error_m);
+  if (args.kinds.empty()) return std::vector<std::string>{"path", clearance ? "clearance" : "energy"};
+  std::vector<std::string> out;
+  for (const std::string& kind : args.kinds) {
+    if (kind == "all") {
+      out = {"path", "energy", "iterations"};
+      if (clearance) out.insert(out.begin() + 1, "clearance");
+      if (latencies) out.push_back("latencies");
+      return out;
+    }
+    if (kind == "latencies" && !latencies)
+      return Problem{args.path, "holds no latencies: a recording (.mcap) of a steered run does"};
+    if (kind == "clearance" && !clearance)
+      return Problem{args.path, "holds no clearance: nothing was in range, or nothing was steered"};
+    out.push_back(kind);
+  }
+  return out;
 }
 
 }  // namespace
 
 int plot(const PlotArgs& args) {
-  runtime::RunOptions o;
-  o.scene_path = args.scene_path;
-  o.overrides = args.overrides;
-  const auto scene = runtime::load(o);
-  if (!scene) return runtime::complain("hamel plot", scene.error());
   if (const auto p = check_picture_name(args.out_path)) return runtime::complain("hamel plot", {*p});
-  const auto rows = read_rows(args.csv_path, scene.value().robot.chain.n());
-  if (!rows) return runtime::complain("hamel plot", {rows.error()});
-  const auto source = perception::Source::make(scene.value().perception);
-  if (!source) return runtime::complain("hamel plot", source.error());
-  const std::string text = script(args, scene.value(), rows.value(), source.value());
+  const auto course = load_course({args.path, args.scene_path, args.overrides});
+  if (!course) return runtime::complain("hamel plot", course.error());
+  const auto kinds = panels(args, course.value());
+  if (!kinds) return runtime::complain("hamel plot", {kinds.error()});
+  const std::string text = Picture(course.value(), kinds.value()).script(args.out_path);
   if (const auto p = draw(text, args.out_path)) return runtime::complain("hamel plot", {*p});
   return runtime::kDone;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// A picture of a run: where the arm went and how close it came, drawn by gnuplot.
+/// Pictures of a run, drawn by gnuplot.
 
 #include <string>
 #include <vector>
@@ -7,9 +7,11 @@
 namespace hamel::client {
 
 struct PlotArgs {
-  std::string scene_path;
+  std::string path;        ///< recording, or what --csv wrote
+  std::string scene_path;  ///< of a CSV; empty: the end effector alone is drawn
   std::vector<std::string> overrides;
-  std::string csv_path;  ///< written by --csv of the same scene
+  std::vector<std::string>
+      kinds;             ///< path, clearance, energy, iterations, latencies; empty: what suits the run
   std::string out_path;  ///< .svg or .png
 };
 

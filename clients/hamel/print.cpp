@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -44,6 +45,11 @@ void print_json(const scene::Scene& scene, const Outcome& o) {
   j["substepped"] = o.summary.substepped;
   j["commands_missed"] = o.summary.commands_missed;
   j["deadlines_missed"] = o.summary.deadlines_missed;
+  j["restarts"] = o.restarts;
+  j["outages"] = nlohmann::ordered_json::array();
+  for (const auto& out : o.outages)
+    j["outages"].push_back({{"service", out.service}, {"t_s", out.t_s}, {"length_s", out.length_s}});
+  j["outages_not_listed"] = o.outages_more;
   j["wall_s"] = number(o.wall_s);
   j["real_time_factor"] = number(o.wall_s > 0 ? o.t_s / o.wall_s : 0);
   j["trajectory_hash"] = o.summary.trajectory_hash;
@@ -81,6 +87,11 @@ void print_table(const scene::Scene& scene, const Outcome& o, const std::string&
   if (o.summary.commands_missed || o.summary.deadlines_missed)
     line("missed", fmt::format("{} steps without a fresh command, {} deadlines", o.summary.commands_missed,
                                o.summary.deadlines_missed));
+  if (o.restarts) line("restarts", fmt::format("{}", o.restarts));
+  for (std::size_t i = 0; i < std::min<std::size_t>(o.outages.size(), 10); ++i)
+    line(i == 0 ? "outages" : "", fmt::format("{} at t = {:.3f} s for {:.3f} s", o.outages[i].service,
+                                              o.outages[i].t_s, o.outages[i].length_s));
+  if (o.outages.size() > 10) line("", fmt::format("and {} more", o.outages.size() - 10 + o.outages_more));
   if (o.rows_lost) line("unseen states", fmt::format("{}", o.rows_lost));
   line("trajectory hash", o.summary.trajectory_hash);
 }

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <thread>
+
 #include "clients/hamel/recorder.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
@@ -12,13 +15,15 @@ using namespace std::chrono_literals;
 
 namespace {
 
+/// A message waits so long at most; waking up for each would cost more than writing it.
+constexpr auto kRound = 20ms;
+
 /// Says when the recording has begun: the writers that are there have been found, and no further one for a
 /// moment.
-class Announcer final : public runtime::Service {
+class Announcer {
  public:
   Announcer(const Recorder& recorder, const RecordArgs& args) : recorder_(recorder), args_(args) {}
-  bool poll(runtime::Clock::time_point now) override {
-    if (!began_) began_ = now;
+  void poll(runtime::Clock::time_point now) {
     const int alive = recorder_.topics_alive();
     if (alive != alive_) {
       alive_ = alive;
@@ -28,20 +33,34 @@ class Announcer final : public runtime::Service {
       said_ = true;
       fmt::print(stderr, "recording {}: {} topics have a writer\n", args_.path, alive_);
     }
-    over_ = args_.duration_s > 0 && now - *began_ > std::chrono::duration<double>(args_.duration_s);
-    return false;
   }
-  runtime::Clock::time_point due() const override { return runtime::Clock::now() + 50ms; }
-  bool finished() const override { return over_; }
 
  private:
   const Recorder& recorder_;
   const RecordArgs& args_;
-  std::optional<runtime::Clock::time_point> began_;
   runtime::Clock::time_point since_{};
   int alive_ = 0;
-  bool said_ = false, over_ = false;
+  bool said_ = false;
 };
+
+/// Until the time is over (true) or a stop was asked for (false).
+bool keep(Recorder& recorder, const RecordArgs& args, const runtime::StopSignal& stop) {
+  Announcer announcer(recorder, args);
+  const auto began = runtime::Clock::now();
+  const auto over = [&] {
+    return args.duration_s > 0 &&
+           runtime::Clock::now() - began > std::chrono::duration<double>(args.duration_s);
+  };
+  for (auto next = began; !stop.requested() && !over(); std::this_thread::sleep_until(next)) {
+    const auto now = runtime::Clock::now();
+    while (recorder.poll(now)) {
+    }
+    announcer.poll(now);
+    next = std::max(next + kRound, now);
+  }
+  recorder.close();
+  return !stop.requested();
+}
 
 }  // namespace
 
@@ -67,9 +86,7 @@ int record(const RecordArgs& args) {
   Recorder& r = *recorder.value();
   fmt::print(stderr, "waiting for writers on {} domain {}\n", bus::to_string(n.options().vendor),
              args.bus.domain);
-  Announcer announcer(r, args);
-  runtime::Service* const services[] = {&r, &announcer};
-  const bool ended = runtime::run(n, services, announcer, stop);
+  const bool ended = keep(r, args, stop);
   fmt::print(stderr, "{}: {}\n", args.path, r.report());
   if (r.problem()) return runtime::complain("hamel record", {*r.problem()});
   return ended && r.messages() == 0 ? runtime::kNoData : runtime::kDone;

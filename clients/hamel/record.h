@@ -34,8 +34,11 @@ struct PlayArgs {
   std::vector<std::string> topics{"obstacles"};
   double rate = 1, begin_s = 0, end_s = -1;
   bool loop = false;
+  bool control = false, paused = false;  ///< commands come from standard input; begin standing still
+  std::uint32_t arm = 1;                 ///< source of the sets made from a CSV
 };
-/// Puts recorded messages on the bus again, byte for byte, at the times of their recording.
+/// Puts recorded messages on the bus again, byte for byte, at the times of their recording; of a CSV, a set a
+/// time.
 int play(const PlayArgs& args);
 
 /// The topic of a full or a short name ("state"); null: there is none.

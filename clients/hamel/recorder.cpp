@@ -16,6 +16,8 @@ namespace hamel::client {
 namespace {
 
 constexpr std::size_t kBatch = 1024;  // samples of a topic taken at once
+constexpr int kDepth = 4096;          // samples of a topic that may wait: four seconds at 1 kHz,
+constexpr int kLatchedDepth = 64;     // two seconds of obstacles
 
 /// Causes before effects; what has no sample time is taken up before (goals, modes) or after the rest.
 constexpr std::array kOrder{&topics::kRobot,     &topics::kMode,  &topics::kGoal,    &topics::kClock,
@@ -59,7 +61,7 @@ Recorder::Recorder(bus::Node& node, const RecorderOptions& options, std::unique_
         file_->add(record::Schema{0, std::string(t.type), "omgidl", std::string(wire::idl_text())});
     lines_[i].topic = &t;
     lines_[i].channel = file_->add(record::Channel{0, schema, std::string(t.name), "cdr", qos(t)});
-    lines_[i].reader = node.reader(t);
+    lines_[i].reader = node.reader(t, t.delivery == Delivery::latched ? kLatchedDepth : kDepth);
   }
 }
 
@@ -78,9 +80,13 @@ void Recorder::begin(const RecorderOptions& o) {
                                                {"duration_s", fmt::format("{}", s.duration_s)}});
     attach("scene.textproto", "text/plain", s.text);
     attach("robot.urdf", "application/xml", s.robot.urdf);
+    if (!s.robot.spheres.empty()) attach("robot.spheres.textproto", "text/plain", s.robot.spheres);
     if (s.perception.stream)
-      if (auto csv = files::read_file(s.perception.stream->path))
-        attach("stream.csv", "text/csv", csv.value());
+      if (auto stream = files::read_file(s.perception.stream->path)) {
+        const bool recording = s.perception.stream->path.ends_with(".mcap");
+        attach(recording ? "stream.mcap" : "stream.csv", recording ? "application/octet-stream" : "text/csv",
+               stream.value());
+      }
   }
   file_->write(about);
 }

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "clients/hamel/commands.h"
 #include "common/runtime/signals.h"
@@ -124,12 +126,12 @@ int status(const StatusArgs& args) {
   if (!node) return runtime::complain("hamel status", {node.error()});
   bus::Node& n = *node.value();
   wire::Subscription<wire::ServiceStatus> sub(n);
-  std::map<std::pair<std::uint32_t, wire::ServiceKind>, wire::ServiceStatus> seen;
+  std::map<std::tuple<std::uint32_t, wire::ServiceKind, bus::WriterId>, wire::ServiceStatus> seen;
   const auto deadline =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(args.seconds));
   wire::ServiceStatus s;
   do {
-    while (sub.take(s)) seen[{s.arm, s.kind}] = s;
+    while (sub.take(s)) seen[{s.arm, s.kind, sub.from()}] = s;
     n.wait(deadline);
   } while (Clock::now() < deadline);
   if (args.json) {
@@ -156,9 +158,20 @@ int status(const StatusArgs& args) {
       for (const auto& c : v.counters) line += fmt::format(" {} {}", c.name, c.value);
       fmt::print("     {}\n", line);
       if (v.idl_hash != wire::idl_hash())
-        fmt::print("      other IDL: {}, ours is {}\n", v.idl_hash, wire::idl_hash());
+        fmt::print("      other IDL: {}, ours is {}: they may not understand each other\n", v.idl_hash,
+                   wire::idl_hash());
+      else if (v.version != runtime::version())
+        fmt::print("      other version than ours, {}\n", runtime::version());
+      const auto same_name = [&](const auto& other) {
+        return other.second.arm == v.arm && other.second.kind == v.kind;
+      };
+      if (std::count_if(seen.begin(), seen.end(), same_name) > 1)
+        fmt::print("      one of several for this arm; incarnation or epoch {}\n", v.incarnation);
     }
   }
+  if (sub.undecodable() > 0)
+    fmt::print(stderr, "hamel status: {} messages did not decode (another IDL?): {} {}\n", sub.undecodable(),
+               sub.last_error().field, sub.last_error().rule);
   if (seen.empty()) {
     fmt::print(stderr, "hamel status: no service spoke within {} s on domain {}\n", args.seconds,
                args.bus.domain);

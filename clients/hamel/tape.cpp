@@ -1,56 +1,15 @@
 #include "clients/hamel/tape.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
-#include <filesystem>
-#include <fstream>
 #include <map>
 
-#include "common/files/scene_text.h"
+#include "clients/hamel/unpacked.h"
 #include "common/record/reader.h"
 
 namespace hamel::client {
 
 namespace {
-
-/// The files that a recording carries, on the disk for as long as they are read.
-class Unpacked {
- public:
-  Unpacked() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "hamel-replay-XXXXXX").string();
-    if (mkdtemp(pattern.data())) folder_ = pattern;
-  }
-  ~Unpacked() {
-    std::error_code ignored;
-    if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
-  }
-  Unpacked(const Unpacked&) = delete;
-  Unpacked& operator=(const Unpacked&) = delete;
-  bool add(const record::Attachment& a) {
-    const std::string name = std::filesystem::path(a.name).filename().string();
-    if (folder_.empty() || name.empty()) return false;
-    std::ofstream out(path(name), std::ios::binary);
-    out.write(a.data.data(), static_cast<std::streamsize>(a.data.size()));
-    return out.good();
-  }
-  bool has(const std::string& name) const { return std::filesystem::exists(path(name)); }
-  std::string path(const std::string& name) const { return folder_ + "/" + name; }
-
- private:
-  std::string folder_;
-};
-
-Checked<scene::Scene> load_scene(const TapeOptions& o, const Unpacked& files) {
-  if (!o.scene_path.empty()) return files::load_scene(o.scene_path, o.overrides);
-  if (!files.has("scene.textproto"))
-    return Problems{{o.path, "holds no scene: it was recorded without one; name it with --scene"}};
-  std::vector<std::string> overrides;
-  if (files.has("robot.urdf")) overrides.push_back("robot.urdf=robot.urdf");
-  if (files.has("stream.csv")) overrides.push_back("perception.stream.path=stream.csv");
-  overrides.insert(overrides.end(), o.overrides.begin(), o.overrides.end());
-  return files::load_scene(files.path("scene.textproto"), overrides);
-}
 
 class Loader {
  public:
@@ -67,7 +26,7 @@ class Loader {
       if (const auto* a = std::get_if<record::Attachment>(&*item)) files_.add(*a);
       if (const auto* m = std::get_if<record::Message>(&*item)) add(*m);
     }
-    auto scene = load_scene(options_, files_);
+    auto scene = load_scene(files_, options_.path, options_.scene_path, options_.overrides);
     if (!scene) return scene.error();
     tape_.scene = std::move(scene).value();
     keep(options_.arm != 0 ? options_.arm : tape_.scene->arm);

@@ -29,7 +29,7 @@ Ticks::Ticks(const scene::Scene& scene)
 void Ticks::look() {
   const double t_s = arm_.t_s(), period_s = source_->period_s();
   while (next_set_ != kNever && static_cast<double>(next_set_) * period_s <= t_s) {
-    if (perception::to_wire(*source_, next_set_, true, set_)) view_.add(set_);
+    if (perception::to_wire(*source_, next_set_, next_set_, true, set_)) view_.add(set_);
     const double next_s = source_->next_time(static_cast<double>(next_set_) * period_s);
     next_set_ = std::isfinite(next_s)
                     ? std::max(next_set_ + 1, static_cast<std::uint64_t>(std::llround(next_s / period_s)))

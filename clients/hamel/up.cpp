@@ -1,6 +1,4 @@
 #include <fmt/format.h>
-#include <stdlib.h>
-#include <sys/stat.h>
 
 #include <filesystem>
 
@@ -8,6 +6,7 @@
 #include "clients/hamel/commands.h"
 #include "clients/hamel/print.h"
 #include "clients/hamel/recorder.h"
+#include "clients/hamel/run_folder.h"
 #include "clients/hamel/supervisor.h"
 #include "common/runtime/log.h"
 
@@ -17,24 +16,19 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A folder for this run's checkpoints, removed with it.
-class TemporaryFolder {
- public:
-  static Result<std::unique_ptr<TemporaryFolder>, Problem> make() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "hamel-XXXXXX").string();
-    if (!mkdtemp(pattern.data())) return Problem{pattern, "cannot make a folder for the checkpoints"};
-    return std::unique_ptr<TemporaryFolder>(new TemporaryFolder(pattern));
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  const std::string& path() const { return path_; }
+constexpr auto kLook = 300ms;
 
- private:
-  explicit TemporaryFolder(std::string path) : path_(std::move(path)) {}
-  std::string path_;
-};
+/// The clock of an arm of this key that runs already; waits a moment, for a match takes one.
+std::optional<wire::SimulationClock> other_arm(bus::Node& node, std::uint32_t arm) {
+  wire::Subscription<wire::SimulationClock> clocks(node);
+  const auto deadline = runtime::Clock::now() + kLook;
+  wire::SimulationClock c;
+  do {
+    while (clocks.take(c))
+      if (c.arm == arm && c.running) return c;
+  } while (node.wait(deadline) || runtime::Clock::now() < deadline);
+  return {};
+}
 
 /// The supervisor as part of the loop.
 class Children final : public runtime::Service {
@@ -61,16 +55,28 @@ std::vector<std::string> command(const std::string& service, const RunArgs& a, c
   for (const auto& o : a.run.overrides) c.insert(c.end(), {"--set", o});
   c.push_back(pace == scene::Pace::lockstep ? "--lockstep" : "--realtime");
   c.insert(c.end(), {"--duration", fmt::format("{}", s.duration_s), "--state-dir", state_dir});
-  const auto& b = a.run.bus;
-  if (!b.vendor.empty()) c.insert(c.end(), {"--bus", b.vendor});
-  c.insert(c.end(), {"--domain", std::to_string(b.domain)});
-  if (!b.interface_name.empty()) c.insert(c.end(), {"--interface", b.interface_name});
-  for (const auto& p : b.peers) c.insert(c.end(), {"--peer", p});
+  runtime::append(a.run.bus, c);
+  runtime::append(a.run.realtime_options, c);
   if (a.run.verbose) c.push_back("--verbose");
   // The recorder is to hear everything from the first word on: it, the monitor and the other services.
   if (!a.record_path.empty())
     c.insert(c.end(), {"--readers", service == "dynamics" && s.steered ? "3" : "2"});
   return c;
+}
+
+}  // namespace
+
+namespace {
+
+/// "cyclonedds", or "fastdds + cyclonedds" where the services differ.
+std::string buses(const RunArgs& args, const scene::Scene& s) {
+  std::string all;
+  for (const std::string& of : {s.bus.dynamics, s.bus.planner, s.bus.perception}) {
+    std::string name = !args.run.bus.vendor.empty() ? args.run.bus.vendor : of;
+    if (name.empty()) name = bus::to_string(bus::kDefaultNetworkVendor);
+    if (all.find(name) == std::string::npos) all += (all.empty() ? "" : " + ") + name;
+  }
+  return all;
 }
 
 }  // namespace
@@ -90,6 +96,12 @@ int up(const RunArgs& asked) {
     return runtime::complain(
         "hamel up", {{"--bus inproc", "reaches one process only; use fastdds or cyclonedds, or hamel run"}});
   const auto pace = runtime::pace(args.run, scene::Pace::realtime);
+  if (const auto there = other_arm(n, s.arm))
+    return runtime::complain(
+        "hamel up",
+        {{fmt::format("arm {}", s.arm),
+          fmt::format("runs already on domain {} (t = {:.3f} s): another --domain, or --set arm={}",
+                      args.run.bus.domain, there->t_s, s.arm + 1)}});
 
   std::unique_ptr<CsvWriter> csv;
   if (!args.csv_path.empty()) {
@@ -97,10 +109,10 @@ int up(const RunArgs& asked) {
     if (!w) return runtime::complain("hamel up", {w.error()});
     csv = std::move(w).value();
   }
-  std::unique_ptr<TemporaryFolder> folder;
+  std::unique_ptr<RunFolder> folder;
   std::string state_dir = args.run.state_dir;
   if (state_dir.empty()) {
-    auto f = TemporaryFolder::make();
+    auto f = RunFolder::make();
     if (!f) return runtime::complain("hamel up", {f.error()});
     folder = std::move(f).value();
     state_dir = folder->path();
@@ -135,7 +147,7 @@ int up(const RunArgs& asked) {
   if (args.json)
     print_json(s, o);
   else
-    print_table(s, o, scene::to_string(pace), bus::to_string(n.options().vendor));
+    print_table(s, o, scene::to_string(pace), buses(args, s));
   if (supervisor.restarts() > 0) spdlog::info("{} restarts", supervisor.restarts());
   if (const auto p = monitor.finish_csv()) return runtime::complain("hamel up", {*p});
   return o.exit_code;

@@ -4,7 +4,7 @@
 /// pointer to events that the node owns until the participant is gone.
 
 #include <algorithm>
-#include <atomic>
+#include <cstring>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -12,8 +12,7 @@
 
 #include "common/bus/backends.h"
 #include "common/bus/cyclone_sertype.h"
-#include "common/bus/network.h"
-#include "common/bus/notifier.h"
+#include "common/bus/events.h"
 #include "common/bus/payload.h"
 #include "dds/dds.h"
 
@@ -59,6 +58,27 @@ std::string element(const std::string& name, std::chrono::milliseconds ms) {
   return element(name, std::to_string(ms.count()) + "ms");
 }
 
+/// DDS Security by the files of an identity.  Debian keeps the plugins where the loader does not look.
+constexpr const char* kPlugins = CYCLONEDDS_PLUGINS;
+std::string security(const Identity& identity) {
+  const auto file = [](const std::string& name, const std::string& path) {
+    return element(name, "file:" + path);
+  };
+  const auto plugin = [](const std::string& library, const std::string& function) {
+    return "<Library path=\"" + std::string(kPlugins) + "/libdds_security_" + library +
+           ".so\" initFunction=\"init_" + function + "\" finalizeFunction=\"finalize_" + function + "\"/>";
+  };
+  return element(
+      "Security",
+      element("Authentication", plugin("auth", "authentication") + file("IdentityCA", identity.ca) +
+                                    file("IdentityCertificate", identity.certificate) +
+                                    file("PrivateKey", identity.key)) +
+          element("Cryptographic", plugin("crypto", "crypto")) +
+          element("AccessControl",
+                  plugin("ac", "access_control") + file("PermissionsCA", identity.permissions_ca) +
+                      file("Governance", identity.governance) + file("Permissions", identity.permissions)));
+}
+
 /// Whole, so that CYCLONEDDS_URI is not asked: a foreign setting must not move the arm's bus.
 std::string configuration(const NodeOptions& options, const Interface& interface) {
   const auto peers = unicast_peers(options, interface);
@@ -72,11 +92,13 @@ std::string configuration(const NodeOptions& options, const Interface& interface
                                 element("MaxAutoParticipantIndex", std::to_string(kMaxParticipantIndex + 1)) +
                                 element("LeaseDuration", kLease) + element("SPDPInterval", kAnnouncement) +
                                 element("Peers", list);
+  const std::string secured =
+      options.security.empty() ? "" : security(find_identity(options.security).value());
   // A writer waits for slow readers above this mark; keep-last already bounds what it holds.
   const std::string internal = element("Watermarks", element("WhcHigh", "1GB"));
   return element("CycloneDDS",
                  element("Domain", element("General", general) + element("Discovery", discovery) +
-                                       element("Internal", internal)));
+                                       element("Internal", internal) + secured));
 }
 
 /// One domain of this process, deleted with its last node.
@@ -109,26 +131,6 @@ class Domain {
   const std::string configuration_;
 };
 
-/// What the vendor's threads tell about one end.
-struct Events {
-  Events(const Topic& t, const NodeOptions& o, Notifier& n, bool writes)
-      : topic(t), options(o), notifier(n), we_write(writes) {}
-
-  void incompatible_with(std::uint32_t policy, std::int32_t change) {
-    if (!logged.exchange(true) && options.log)
-      options.log(incompatible_sentence(topic, we_write, static_cast<int>(policy), Vendor::cyclonedds));
-    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
-  }
-
-  const Topic& topic;
-  const NodeOptions& options;
-  Notifier& notifier;
-  const bool we_write;
-  std::atomic<int> matched{0};
-  std::atomic<std::uint64_t> incompatible{0}, lost{0};
-  std::atomic<bool> logged{false};
-};
-
 Events& events_of(void* arg) { return *static_cast<Events*>(arg); }
 
 struct Deleter {
@@ -140,7 +142,7 @@ using Qos = std::unique_ptr<dds_qos_t, Deleter>;
 
 Listener listener_for(Events& events) {
   Listener l(dds_create_listener(&events));
-  dds_lset_data_available(l.get(), [](dds_entity_t, void* arg) { events_of(arg).notifier.notify(); });
+  dds_lset_data_available(l.get(), [](dds_entity_t, void* arg) { events_of(arg).inbound.notifier.notify(); });
   dds_lset_subscription_matched(l.get(),
                                 [](dds_entity_t, dds_subscription_matched_status_t status, void* arg) {
                                   events_of(arg).matched = static_cast<int>(status.current_count);
@@ -150,26 +152,36 @@ Listener listener_for(Events& events) {
   });
   dds_lset_requested_incompatible_qos(
       l.get(), [](dds_entity_t, dds_requested_incompatible_qos_status_t status, void* arg) {
-        events_of(arg).incompatible_with(status.last_policy_id, status.total_count_change);
+        events_of(arg).incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
       });
   dds_lset_offered_incompatible_qos(
       l.get(), [](dds_entity_t, dds_offered_incompatible_qos_status_t status, void* arg) {
-        events_of(arg).incompatible_with(status.last_policy_id, status.total_count_change);
+        events_of(arg).incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
       });
   dds_lset_sample_lost(l.get(), [](dds_entity_t, dds_sample_lost_status_t status, void* arg) {
-    events_of(arg).lost += static_cast<std::uint64_t>(std::max(status.total_count_change, 0));
+    Events::add(events_of(arg).lost, status.total_count_change);
+  });
+  dds_lset_requested_deadline_missed(
+      l.get(), [](dds_entity_t, dds_requested_deadline_missed_status_t status, void* arg) {
+        Events::add(events_of(arg).late, status.total_count_change);
+      });
+  dds_lset_liveliness_changed(l.get(), [](dds_entity_t, dds_liveliness_changed_status_t status, void* arg) {
+    Events::add(events_of(arg).silent, status.not_alive_count_change);
   });
   return l;
 }
 
-Qos qos_for(const Topic& topic, bool writes) {
+/// `promises`: those of a topic's writers, offered by each, asked for by some readers.
+Qos qos_for(const Topic& topic, bool writes, int depth, bool promises) {
   const bool latched = topic.delivery == Delivery::latched;
-  const int depth = latched ? 1 : kStreamDepth;
+  const auto more = writes ? std::chrono::milliseconds(0) : kRounding;
   Qos q(dds_create_qos());
   dds_qset_reliability(q.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_durability(q.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, depth);
   dds_qset_resource_limits(q.get(), kMaxInstances * depth, kMaxInstances, depth);
+  if (promises && topic.rate_hz > 0) dds_qset_deadline(q.get(), DDS_MSECS((topic.stale + more).count()));
+  if (promises) dds_qset_liveliness(q.get(), DDS_LIVELINESS_AUTOMATIC, DDS_MSECS((kAlive + more).count()));
   if (writes) dds_qset_writer_data_lifecycle(q.get(), false);
   return q;
 }
@@ -188,8 +200,17 @@ class CycloneWriter final : public Writer {
     ++(sent ? samples_ : refused_);
     return sent;
   }
+  bool dispose(std::span<const std::byte> payload) override {
+    return acceptable(payload, topic_) && dds_dispose(writer_, &payload) == DDS_RETCODE_OK;
+  }
+  WriterId id() const override {
+    WriterId id{};
+    dds_guid_t guid;
+    if (dds_get_guid(writer_, &guid) == DDS_RETCODE_OK) std::copy_n(guid.v, id.size(), id.begin());
+    return id;
+  }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return {samples_, 0, refused_, events_.incompatible}; }
+  Counters counters() const override { return events_.counters(samples_, refused_); }
 
  private:
   const Topic& topic_;
@@ -212,13 +233,27 @@ class CycloneReader final : public Reader {
     dds_sample_info_t info;
     while (dds_takecdr(reader_, &data, 1, &info, DDS_ANY_STATE) == 1) {
       const bool good = info.valid_data && copy(*static_cast<const cyclone::Sample*>(data), payload);
+      disposed_ += !info.valid_data;
       ddsi_serdata_unref(data);
+      from_ = info.publication_handle;
       if (good) return true;
     }
     return false;
   }
+  WriterId from() const override {
+    if (const auto known = ids_.find(from_); known != ids_.end()) return known->second;
+    WriterId id{};
+    std::memcpy(id.data(), &from_, sizeof from_);  // a writer that has left since: a number of its own
+    auto* writer = dds_get_matched_publication_data(reader_, from_);
+    if (writer == nullptr) return id;
+    std::copy_n(writer->key.v, id.size(), id.begin());
+    dds_builtintopic_free_endpoint(writer);
+    if (ids_.size() >= kMaxInstances) ids_.clear();
+    ids_[from_] = id;
+    return id;
+  }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return {samples_, events_.lost, refused_, events_.incompatible}; }
+  Counters counters() const override { return events_.counters(samples_, refused_, disposed_); }
 
  private:
   bool copy(const cyclone::Sample& sample, Payload& payload) {
@@ -232,8 +267,46 @@ class CycloneReader final : public Reader {
   const Topic& topic_;
   const dds_entity_t reader_;
   Events& events_;
-  std::uint64_t samples_ = 0, refused_ = 0;
+  dds_instance_handle_t from_ = 0;
+  mutable std::map<dds_instance_handle_t, WriterId> ids_;
+  std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0;
 };
+
+/// Everything that waits in a reader of a built-in topic, as T, each freed after its use.
+template <class T, class Use>
+void read_builtin(dds_entity_t participant, dds_entity_t topic, Use use) {
+  const dds_entity_t reader = dds_create_reader(participant, topic, nullptr, nullptr);
+  if (reader < 0) return;
+  void* sample = nullptr;
+  dds_sample_info_t info;
+  while (dds_take(reader, &sample, &info, 1, 1) == 1) {
+    if (info.valid_data && info.instance_state == DDS_IST_ALIVE) use(*static_cast<const T*>(sample));
+    dds_return_loan(reader, &sample, 1);
+  }
+  dds_delete(reader);
+}
+
+WriterId id_of(const dds_guid_t& guid) {
+  WriterId id;
+  std::copy_n(guid.v, id.size(), id.begin());
+  return id;
+}
+
+Endpoint endpoint_of(const dds_builtintopic_endpoint_t& e, bool writes) {
+  Endpoint out{.topic = e.topic_name, .type = e.type_name, .writes = writes};
+  dds_reliability_kind_t reliability = DDS_RELIABILITY_BEST_EFFORT;
+  dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE;
+  dds_ownership_kind_t ownership = DDS_OWNERSHIP_SHARED;
+  dds_duration_t blocking = 0;
+  dds_qget_reliability(e.qos, &reliability, &blocking);
+  dds_qget_durability(e.qos, &durability);
+  dds_qget_ownership(e.qos, &ownership);
+  out.reliable = reliability == DDS_RELIABILITY_RELIABLE;
+  out.latched = durability != DDS_DURABILITY_VOLATILE;
+  out.exclusive = ownership == DDS_OWNERSHIP_EXCLUSIVE;
+  out.id = id_of(e.key);
+  return out;
+}
 
 dds_entity_t checked(dds_entity_t made, const char* what, const Topic& topic) {
   if (made >= 0) return made;
@@ -258,25 +331,56 @@ class CycloneNode final : public Node {
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
     Events& events = make_events(topic, true);
-    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic), qos_for(topic, true).get(),
-                                                listener_for(events).get());
+    const dds_entity_t made =
+        dds_create_writer(participant_, topic_for(topic),
+                          qos_for(topic, true, depth_of(topic.delivery), true).get(), listener_for(events).get());
     return std::make_unique<CycloneWriter>(topic, checked(made, "writer", topic), events);
   }
 
-  std::unique_ptr<Reader> reader(const Topic& topic) override {
+  std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     Events& events = make_events(topic, false);
-    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic), qos_for(topic, false).get(),
-                                                listener_for(events).get());
+    if (depth <= 0) depth = depth_of(topic.delivery);
+    const dds_entity_t made = dds_create_reader(
+        participant_, topic_for(topic), qos_for(topic, false, depth, ask == Ask::promises).get(), listener_for(events).get());
     return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events);
   }
 
-  bool wait(std::chrono::steady_clock::time_point deadline) override { return notifier_.wait(deadline); }
-  void wake() noexcept override { notifier_.notify(); }
+  std::vector<Endpoint> endpoints() override {
+    std::map<WriterId, std::string> names;
+    read_builtin<dds_builtintopic_participant_t>(participant_, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT,
+                                                 [&](const dds_builtintopic_participant_t& p) {
+                                                   char* name = nullptr;
+                                                   if (!dds_qget_entity_name(p.qos, &name) || name == nullptr)
+                                                     return;
+                                                   names[id_of(p.key)] = name;
+                                                   dds_free(name);
+                                                 });
+    dds_guid_t own{};
+    dds_get_guid(participant_, &own);
+    std::vector<Endpoint> all;
+    for (const bool writes : {true, false})
+      read_builtin<dds_builtintopic_endpoint_t>(
+          participant_, writes ? DDS_BUILTIN_TOPIC_DCPSPUBLICATION : DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION,
+          [&](const dds_builtintopic_endpoint_t& e) {
+            if (id_of(e.participant_key) == id_of(own)) return;
+            all.push_back(endpoint_of(e, writes));
+            if (const auto name = names.find(id_of(e.participant_key)); name != names.end())
+              all.back().participant = name->second;
+          });
+    return all;
+  }
+  std::uint64_t incompatible() const override { return inbound_.incompatible(); }
+  bool wait(std::chrono::steady_clock::time_point deadline) override {
+    return inbound_.wait(deadline, [this](const Disagreement& d) {
+      if (options_.log) options_.log(incompatible_sentence(d, Vendor::cyclonedds, endpoints()));
+    });
+  }
+  void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
 
  private:
   Events& make_events(const Topic& topic, bool writes) {
-    events_.push_back(std::make_unique<Events>(topic, options_, notifier_, writes));
+    events_.push_back(std::make_unique<Events>(topic, inbound_, writes));
     return *events_.back();
   }
 
@@ -288,7 +392,7 @@ class CycloneNode final : public Node {
 
   const NodeOptions options_;
   const std::shared_ptr<Domain> domain_;
-  Notifier notifier_;
+  Inbound inbound_;
   std::vector<std::unique_ptr<Events>> events_;  // until the participant is gone
   std::map<std::string_view, dds_entity_t> topics_;
   dds_entity_t participant_ = 0;
@@ -301,6 +405,11 @@ Result<std::unique_ptr<Node>, Problem> open_cyclonedds(const NodeOptions& option
   const auto interface = find_interface(options.interface_name);
   if (!interface) return interface.error();
   if (const auto peers = check_peers(options.peers); !peers) return peers.error();
+  if (!options.discovery_server.empty())
+    return Problem{"discovery server", "= " + options.discovery_server +
+                                           ", is Fast DDS's own; with cyclonedds name the hosts as peers"};
+  if (!options.security.empty())
+    if (const auto identity = find_identity(options.security); !identity) return identity.error();
   auto domain = Domain::of(options, interface.value());
   if (!domain) return domain.error();
   auto node = std::make_unique<CycloneNode>(options, std::move(domain).value());

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -24,9 +25,9 @@
 #include <variant>
 
 #include "common/bus/backends.h"
+#include "common/bus/events.h"
 #include "common/bus/fastdds_type.h"
 #include "common/bus/network.h"
-#include "common/bus/notifier.h"
 
 namespace hamel::bus {
 namespace {
@@ -43,23 +44,12 @@ Duration_t duration(std::chrono::milliseconds ms) {
 /// A late Cyclone reader waits for the writer's next heartbeat; Fast DDS's default is 3 s.
 constexpr std::chrono::milliseconds kHeartbeat{100};
 
-/// What the vendor's threads tell about one end.
-struct Events {
-  Events(const Topic& t, const NodeOptions& o, bool writes) : topic(t), options(o), we_write(writes) {}
-
-  void incompatible_with(int policy, int change) {
-    if (!logged.exchange(true) && options.log)
-      options.log(incompatible_sentence(topic, we_write, policy, Vendor::fastdds));
-    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
-  }
-
-  const Topic& topic;
-  const NodeOptions& options;
-  const bool we_write;
-  std::atomic<int> matched{0};
-  std::atomic<std::uint64_t> incompatible{0}, lost{0};
-  std::atomic<bool> logged{false};
-};
+WriterId id_of(const rtps::GUID_t& guid) {
+  WriterId id;
+  std::copy_n(guid.guidPrefix.value, rtps::GuidPrefix_t::size, id.begin());
+  std::copy_n(guid.entityId.value, rtps::EntityId_t::size, id.begin() + rtps::GuidPrefix_t::size);
+  return id;
+}
 
 struct WriterEvents final : Events, dds::DataWriterListener {
   using Events::Events;
@@ -73,8 +63,8 @@ struct WriterEvents final : Events, dds::DataWriterListener {
 };
 
 struct ReaderEvents final : Events, dds::DataReaderListener {
-  ReaderEvents(const Topic& t, const NodeOptions& o, Notifier& n) : Events(t, o, false), notifier(n) {}
-  void on_data_available(dds::DataReader*) override { notifier.notify(); }
+  using Events::Events;
+  void on_data_available(dds::DataReader*) override { inbound.notifier.notify(); }
   void on_subscription_matched(dds::DataReader*, const dds::SubscriptionMatchedStatus& status) override {
     matched = status.current_count;
   }
@@ -83,20 +73,77 @@ struct ReaderEvents final : Events, dds::DataReaderListener {
     incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
   }
   void on_sample_lost(dds::DataReader*, const dds::SampleLostStatus& status) override {
-    lost += static_cast<std::uint64_t>(std::max(status.total_count_change, 0));
+    add(lost, status.total_count_change);
   }
-  Notifier& notifier;
+  void on_requested_deadline_missed(dds::DataReader*,
+                                    const dds::RequestedDeadlineMissedStatus& status) override {
+    add(late, status.total_count_change);
+  }
+  void on_liveliness_changed(dds::DataReader*, const dds::LivelinessChangedStatus& status) override {
+    add(silent, status.not_alive_count_change);
+  }
+};
+
+/// The ends of other participants, as the vendor's threads find them.
+class Neighbours final : public dds::DomainParticipantListener {
+ public:
+  void on_participant_discovery(dds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& found) override {
+    const bool gone = found.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
+                      found.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
+    const std::lock_guard lock(mutex_);
+    if (gone)
+      names_.erase(found.info.m_guid.guidPrefix);
+    else
+      names_[found.info.m_guid.guidPrefix] = found.info.m_participantName.to_string();
+  }
+  void on_publisher_discovery(dds::DomainParticipant*, rtps::WriterDiscoveryInfo&& found) override {
+    keep(found.info, found.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER, true);
+  }
+  void on_subscriber_discovery(dds::DomainParticipant*, rtps::ReaderDiscoveryInfo&& found) override {
+    keep(found.info, found.status == rtps::ReaderDiscoveryInfo::REMOVED_READER, false);
+  }
+  std::vector<Endpoint> all() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<Endpoint> known;
+    for (const auto& [guid, end] : ends_) {
+      known.push_back(end);
+      if (const auto name = names_.find(guid.guidPrefix); name != names_.end())
+        known.back().participant = name->second;
+    }
+    return known;
+  }
+
+ private:
+  template <class Proxy>
+  void keep(const Proxy& data, bool gone, bool writes) {
+    const std::lock_guard lock(mutex_);
+    if (gone) {
+      ends_.erase(data.guid());
+      return;
+    }
+    Endpoint e{.topic = data.topicName().to_string(), .type = data.typeName().to_string(), .writes = writes};
+    e.reliable = data.m_qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS;
+    e.latched = data.m_qos.m_durability.kind != dds::VOLATILE_DURABILITY_QOS;
+    e.exclusive = data.m_qos.m_ownership.kind == dds::EXCLUSIVE_OWNERSHIP_QOS;
+    e.id = id_of(data.guid());
+    if (ends_.size() < kMaxNeighbours) ends_[data.guid()] = e;
+  }
+
+  static constexpr std::size_t kMaxNeighbours = 4096;
+  mutable std::mutex mutex_;
+  std::map<rtps::GUID_t, Endpoint> ends_;
+  std::map<rtps::GuidPrefix_t, std::string> names_;
 };
 
 /// The part of QoS that writers and readers share.
 template <class Qos>
-Qos common_qos(const Topic& topic) {
+Qos common_qos(const Topic& topic, int depth) {
   const bool latched = topic.delivery == Delivery::latched;
   Qos qos;
   qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
-  qos.history().depth = latched ? 1 : kStreamDepth;
+  qos.history().depth = depth;
   qos.resource_limits().max_instances = kMaxInstances;
   qos.resource_limits().max_samples_per_instance = qos.history().depth;
   qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
@@ -106,10 +153,20 @@ Qos common_qos(const Topic& topic) {
   return qos;
 }
 
+/// The promises of a topic's writers, offered by each, asked for by some readers.
+template <class Qos>
+void promise(Qos& qos, const Topic& topic, std::chrono::milliseconds more = {}) {
+  if (topic.rate_hz > 0) qos.deadline().period = duration(topic.stale + more);
+  qos.liveliness().kind = dds::AUTOMATIC_LIVELINESS_QOS;
+  qos.liveliness().lease_duration = duration(kAlive + more);
+  qos.liveliness().announcement_period = duration(kAlive / 3);
+}
+
 dds::DataWriterQos writer_qos(const Topic& topic) {
-  auto qos = common_qos<dds::DataWriterQos>(topic);
+  auto qos = common_qos<dds::DataWriterQos>(topic, depth_of(topic.delivery));
   qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
   qos.reliable_writer_qos().times.heartbeatPeriod = duration(kHeartbeat);
+  promise(qos, topic);
   qos.writer_data_lifecycle().autodispose_unregistered_instances = false;
   return qos;
 }
@@ -129,8 +186,14 @@ class FastWriter final : public Writer {
     ++(sent ? samples_ : refused_);
     return sent;
   }
+  bool dispose(std::span<const std::byte> payload) override {
+    if (!acceptable(payload, topic_)) return false;
+    RawSample sample{payload, nullptr, payload.size()};
+    return writer_.dispose(&sample, dds::HANDLE_NIL) == ReturnCode_t::RETCODE_OK;
+  }
+  WriterId id() const override { return id_of(writer_.guid()); }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return {samples_, 0, refused_, events_.incompatible}; }
+  Counters counters() const override { return events_.counters(samples_, refused_); }
 
  private:
   const Topic& topic_;
@@ -153,22 +216,28 @@ class FastReader final : public Reader {
     RawSample sample{{}, &payload, 0};
     dds::SampleInfo info;
     while (reader_.take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
-      if (!info.valid_data) continue;  // an instance's state changed
+      if (!info.valid_data) {  // an instance's state changed
+        ++disposed_;
+        continue;
+      }
+      from_ = info.sample_identity.writer_guid();
       const bool good = sample.size == payload.size() && acceptable(payload, topic_);
       ++(good ? samples_ : refused_);
       if (good) return true;
     }
     return false;
   }
+  WriterId from() const override { return id_of(from_); }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return {samples_, events_.lost, refused_, events_.incompatible}; }
+  Counters counters() const override { return events_.counters(samples_, refused_, disposed_); }
 
  private:
   const Topic& topic_;
   dds::Subscriber& subscriber_;
   dds::DataReader& reader_;
   ReaderEvents& events_;
-  std::uint64_t samples_ = 0, refused_ = 0;
+  rtps::GUID_t from_;
+  std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0;
 };
 
 template <class T>
@@ -221,29 +290,37 @@ class FastNode final : public Node {
   bool start(dds::DomainParticipantQos qos) {
     qos.wire_protocol().participant_id = number_.get();
     auto* factory = dds::DomainParticipantFactory::get_instance();
-    participant_ = factory->create_participant(options_.domain, qos);
+    participant_ = factory->create_participant(options_.domain, qos, &neighbours_, dds::StatusMask::none());
     if (participant_ == nullptr) return false;
     publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
     subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
-    return publisher_ != nullptr && subscriber_ != nullptr;
+    return started();
   }
+  bool started() const { return publisher_ != nullptr && subscriber_ != nullptr; }
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
-    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, options_, true));
+    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, inbound_, true));
     auto& made = checked(publisher_->create_datawriter(&topic_for(topic), writer_qos(topic), &events),
                          "writer", topic);
     return std::make_unique<FastWriter>(topic, *publisher_, made, events);
   }
 
-  std::unique_ptr<Reader> reader(const Topic& topic) override {
-    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, options_, notifier_));
-    const auto qos = common_qos<dds::DataReaderQos>(topic);
+  std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
+    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false));
+    auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
+    if (ask == Ask::promises) promise(qos, topic, kRounding);
     auto& made = checked(subscriber_->create_datareader(&topic_for(topic), qos, &events), "reader", topic);
     return std::make_unique<FastReader>(topic, *subscriber_, made, events);
   }
 
-  bool wait(std::chrono::steady_clock::time_point deadline) override { return notifier_.wait(deadline); }
-  void wake() noexcept override { notifier_.notify(); }
+  std::vector<Endpoint> endpoints() override { return neighbours_.all(); }
+  std::uint64_t incompatible() const override { return inbound_.incompatible(); }
+  bool wait(std::chrono::steady_clock::time_point deadline) override {
+    return inbound_.wait(deadline, [this](const Disagreement& d) {
+      if (options_.log) options_.log(incompatible_sentence(d, Vendor::fastdds, endpoints()));
+    });
+  }
+  void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
 
  private:
@@ -266,7 +343,8 @@ class FastNode final : public Node {
 
   const NodeOptions options_;
   const ParticipantNumber number_;
-  Notifier notifier_;
+  Inbound inbound_;
+  Neighbours neighbours_;
   std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
   std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
   std::map<std::string_view, dds::Topic*> topics_;
@@ -292,6 +370,34 @@ rtps::GuidPrefix_t random_prefix() {
   for (unsigned i = 2; i < rtps::GuidPrefix_t::size; ++i)
     prefix.value[i] = static_cast<rtps::octet>(device());
   return prefix;
+}
+
+/// DDS Security by the files of an identity.
+void secure(dds::DomainParticipantQos& qos, const Identity& identity) {
+  auto& properties = qos.properties().properties();
+  const auto set = [&](const std::string& name, const std::string& value) {
+    properties.emplace_back("dds.sec." + name, value);
+  };
+  const auto file = [&](const std::string& name, const std::string& path) { set(name, "file://" + path); };
+  set("auth.plugin", "builtin.PKI-DH");
+  file("auth.builtin.PKI-DH.identity_ca", identity.ca);
+  file("auth.builtin.PKI-DH.identity_certificate", identity.certificate);
+  file("auth.builtin.PKI-DH.private_key", identity.key);
+  set("access.plugin", "builtin.Access-Permissions");
+  file("access.builtin.Access-Permissions.permissions_ca", identity.permissions_ca);
+  file("access.builtin.Access-Permissions.governance", identity.governance);
+  file("access.builtin.Access-Permissions.permissions", identity.permissions);
+  set("crypto.plugin", "builtin.AES-GCM-GMAC");
+}
+
+/// A client of a discovery server of Fast DDS (its first, as `fast-discovery-server -i 0` is).
+void use_server(dds::DomainParticipantQos& qos, const Server& server) {
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.discoveryProtocol = eprosima::fastrtps::rtps::DiscoveryProtocol_t::CLIENT;
+  rtps::RemoteServerAttributes remote;
+  remote.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");
+  remote.metatrafficUnicastLocatorList.push_back(locator(server.address, server.port));
+  discovery.m_DiscoveryServers.push_back(remote);
 }
 
 dds::DomainParticipantQos participant_qos(const NodeOptions& options, const Interface& interface, int index) {
@@ -327,8 +433,23 @@ Result<std::unique_ptr<Node>, Problem> open_fastdds(const NodeOptions& options) 
   if (const auto peers = check_peers(options.peers); !peers) return peers.error();
   const auto index = free_participant_index(options.domain);
   if (!index) return index.error();
+  auto qos = participant_qos(options, interface.value(), index.value());
+  if (!options.discovery_server.empty()) {
+    const auto server = parse_server(options.discovery_server);
+    if (!server) return server.error();
+    use_server(qos, server.value());
+  }
+  if (!options.security.empty()) {
+    const auto identity = find_identity(options.security);
+    if (!identity) return identity.error();
+    secure(qos, identity.value());
+  }
   auto node = std::make_unique<FastNode>(options);
-  if (!node->start(participant_qos(options, interface.value(), index.value())))
+  if (!node->start(qos) && !options.security.empty())
+    return Problem{"security", "= " + options.security +
+                                   ", Fast DDS refuses it: expired, of another CA, or "
+                                   "its subject is not the one in the permissions"};
+  if (!node->started())
     return Problem{"domain", "= " + std::to_string(options.domain) + ", Fast DDS refuses to join it on " +
                                  interface.value().address};
   return std::unique_ptr<Node>(std::move(node));

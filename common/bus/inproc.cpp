@@ -6,6 +6,8 @@
 /// have been as long as they get, nothing allocates.
 
 #include <algorithm>
+#include <atomic>
+#include <cstring>
 #include <list>
 #include <map>
 #include <mutex>
@@ -21,12 +23,12 @@ namespace {
 /// The samples that wait for one reader, oldest first, at most `depth` of each key.
 class Inbox {
  public:
-  Inbox(const Topic& topic, Notifier& notifier)
-      : depth_(topic.delivery == Delivery::latched ? 1 : kStreamDepth),
-        counts_loss_(topic.delivery == Delivery::stream),
+  Inbox(const Topic& topic, int depth, Notifier& notifier)
+      : depth_(depth > 0 ? depth : depth_of(topic.delivery)),
+        counts_loss_(topic.delivery == Delivery::stream || depth > 1),
         notifier_(notifier) {}
 
-  void push(std::uint32_t key, std::span<const std::byte> payload) {
+  void push(std::uint32_t key, std::span<const std::byte> payload, const WriterId& from) {
     int& waiting = waiting_[key];
     if (waiting == depth_) {
       drop_oldest(key);
@@ -36,6 +38,7 @@ class Inbox {
     if (spare_.empty()) spare_.emplace_back();
     queue_.splice(queue_.end(), spare_, spare_.begin());
     queue_.back().key = key;
+    queue_.back().from = from;
     queue_.back().payload.assign(payload.begin(), payload.end());
     notifier_.notify();
   }
@@ -44,6 +47,7 @@ class Inbox {
     if (queue_.empty()) return false;
     Sample& oldest = queue_.front();
     std::swap(payload, oldest.payload);
+    from_ = oldest.from;
     --waiting_[oldest.key];
     spare_.splice(spare_.end(), queue_, queue_.begin());
     ++counters_.samples;
@@ -51,10 +55,13 @@ class Inbox {
   }
 
   const Counters& counters() const { return counters_; }
+  const WriterId& from() const { return from_; }
+  void count_disposed() { ++counters_.disposed; }
 
  private:
   struct Sample {
     std::uint32_t key = 0;
+    WriterId from{};
     Payload payload;
   };
 
@@ -70,13 +77,28 @@ class Inbox {
   Notifier& notifier_;
   std::list<Sample> queue_, spare_;
   std::unordered_map<std::uint32_t, int> waiting_;
+  WriterId from_{};
   Counters counters_;
 };
 
 /// What one writer of a latched topic keeps for readers to come: the last sample of each key.
-using Outlet = std::map<std::uint32_t, Payload>;
+struct Outlet {
+  WriterId id{};
+  std::string participant;
+  std::map<std::uint32_t, Payload> last;
+};
+
+/// Writers of this process, numbered.
+WriterId next_id() {
+  static std::atomic<std::uint64_t> count{0};
+  const std::uint64_t number = ++count;
+  WriterId id{};
+  std::memcpy(id.data(), &number, sizeof number);
+  return id;
+}
 
 struct Channel {
+  const Topic* topic = nullptr;
   std::mutex mutex;
   std::list<Inbox*> inboxes;
   std::list<Outlet*> outlets;
@@ -97,7 +119,29 @@ class Space {
 
   Channel& channel(const Topic& topic) {
     std::lock_guard lock(mutex_);
-    return channels_[topic.name];
+    Channel& channel = channels_[topic.name];
+    channel.topic = &topic;
+    return channel;
+  }
+
+  std::vector<Endpoint> endpoints() {
+    std::lock_guard lock(mutex_);
+    std::vector<Endpoint> all;
+    for (auto& [name, channel] : channels_) {
+      std::lock_guard inner(channel.mutex);
+      Endpoint e{.topic = std::string(name),
+                 .type = std::string(channel.topic->type),
+                 .reliable = true,
+                 .latched = channel.topic->delivery == Delivery::latched};
+      all.insert(all.end(), channel.inboxes.size(), e);
+      e.writes = true;
+      for (const Outlet* outlet : channel.outlets) {
+        e.id = outlet->id;
+        e.participant = outlet->participant;
+        all.push_back(e);
+      }
+    }
+    return all;
   }
 
  private:
@@ -107,13 +151,14 @@ class Space {
 
 class InprocWriter final : public Writer {
  public:
-  InprocWriter(const Topic& topic, Channel& channel) : topic_(topic), channel_(channel) {
+  InprocWriter(const Topic& topic, Channel& channel, const std::string& participant)
+      : topic_(topic), channel_(channel), outlet_{next_id(), participant, {}} {
     std::lock_guard lock(channel_.mutex);
-    channel_.outlets.push_back(&last_);
+    channel_.outlets.push_back(&outlet_);
   }
   ~InprocWriter() override {
     std::lock_guard lock(channel_.mutex);
-    channel_.outlets.remove(&last_);
+    channel_.outlets.remove(&outlet_);
   }
 
   bool write(std::span<const std::byte> payload) override {
@@ -123,11 +168,19 @@ class InprocWriter final : public Writer {
       return false;
     }
     const std::uint32_t key = topic_.keyed ? key_of(payload) : 0;
-    for (Inbox* inbox : channel_.inboxes) inbox->push(key, payload);
-    if (topic_.delivery == Delivery::latched) last_[key].assign(payload.begin(), payload.end());
+    for (Inbox* inbox : channel_.inboxes) inbox->push(key, payload, outlet_.id);
+    if (topic_.delivery == Delivery::latched) outlet_.last[key].assign(payload.begin(), payload.end());
     ++counters_.samples;
     return true;
   }
+  bool dispose(std::span<const std::byte> payload) override {
+    std::lock_guard lock(channel_.mutex);
+    if (!acceptable(payload, topic_)) return false;
+    outlet_.last.erase(topic_.keyed ? key_of(payload) : 0);
+    for (Inbox* inbox : channel_.inboxes) inbox->count_disposed();
+    return true;
+  }
+  WriterId id() const override { return outlet_.id; }
   int matched() const override {
     std::lock_guard lock(channel_.mutex);
     return static_cast<int>(channel_.inboxes.size());
@@ -140,17 +193,17 @@ class InprocWriter final : public Writer {
  private:
   const Topic& topic_;
   Channel& channel_;
-  Outlet last_;
+  Outlet outlet_;
   Counters counters_;
 };
 
 class InprocReader final : public Reader {
  public:
-  InprocReader(const Topic& topic, Channel& channel, Notifier& notifier)
-      : inbox_(topic, notifier), channel_(channel) {
+  InprocReader(const Topic& topic, int depth, Channel& channel, Notifier& notifier)
+      : inbox_(topic, depth, notifier), channel_(channel) {
     std::lock_guard lock(channel_.mutex);
     for (const Outlet* outlet : channel_.outlets)
-      for (const auto& [key, payload] : *outlet) inbox_.push(key, payload);
+      for (const auto& [key, payload] : outlet->last) inbox_.push(key, payload, outlet->id);
     channel_.inboxes.push_back(&inbox_);
   }
   ~InprocReader() override {
@@ -162,6 +215,7 @@ class InprocReader final : public Reader {
     std::lock_guard lock(channel_.mutex);
     return inbox_.pop(payload);
   }
+  WriterId from() const override { return inbox_.from(); }
   int matched() const override {
     std::lock_guard lock(channel_.mutex);
     return static_cast<int>(channel_.outlets.size());
@@ -181,11 +235,13 @@ class InprocNode final : public Node {
   explicit InprocNode(const NodeOptions& options) : options_(options), space_(Space::of(options.domain)) {}
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
-    return std::make_unique<InprocWriter>(topic, space_->channel(topic));
+    return std::make_unique<InprocWriter>(topic, space_->channel(topic), options_.name);
   }
-  std::unique_ptr<Reader> reader(const Topic& topic) override {
-    return std::make_unique<InprocReader>(topic, space_->channel(topic), notifier_);
+  std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask) override {
+    return std::make_unique<InprocReader>(topic, depth, space_->channel(topic), notifier_);
   }
+  std::vector<Endpoint> endpoints() override { return space_->endpoints(); }
+  std::uint64_t incompatible() const override { return 0; }
   bool wait(std::chrono::steady_clock::time_point deadline) override { return notifier_.wait(deadline); }
   void wake() noexcept override { notifier_.notify(); }
   const NodeOptions& options() const override { return options_; }

@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
+#include <filesystem>
 #include <map>
 #include <system_error>
 #include <variant>
@@ -124,13 +126,57 @@ const char* policy_name(int id) {
   return name == names.end() ? "an unnamed policy" : name->second;
 }
 
-std::string incompatible_sentence(const Topic& topic, bool we_write, int policy, Vendor vendor) {
-  const std::string ours = std::string(we_write ? "our writer offers" : "our reader asks for") +
-                           " reliable, " +
-                           (topic.delivery == Delivery::latched ? "transient-local" : "volatile");
-  const std::string theirs = we_write ? "a peer's reader asks for more" : "a peer's writer offers less";
-  return "topic " + std::string(topic.name) + " (" + to_string(vendor) + "): QoS " + policy_name(policy) +
-         " does not match: " + ours + ", " + theirs + "; no data flows between the two";
+namespace {
+
+std::string qos_of(bool reliable, bool latched, bool exclusive) {
+  return std::string(reliable ? "reliable, " : "best-effort, ") + (latched ? "transient-local" : "volatile") +
+         (exclusive ? ", exclusive" : "");
+}
+
+}  // namespace
+
+std::string incompatible_sentence(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known) {
+  const bool latched = d.topic->delivery == Delivery::latched;
+  std::string theirs = d.we_write ? "a peer's reader asks for more" : "a peer's writer offers less";
+  for (const Endpoint& e : known) {
+    const bool same = e.reliable && e.latched == latched && !e.exclusive;
+    if (e.topic != d.topic->name || e.writes == d.we_write || same) continue;
+    theirs = std::string(d.we_write ? "the reader" : "the writer") + " of " +
+             (e.participant.empty() ? "an unnamed participant" : e.participant) +
+             (d.we_write ? " asks for " : " offers ") + qos_of(e.reliable, e.latched, e.exclusive);
+  }
+  return "topic " + std::string(d.topic->name) + " (" + to_string(vendor) + "): QoS " +
+         policy_name(d.policy) +
+         " does not match: " + (d.we_write ? "our writer offers " : "our reader asks for ") +
+         qos_of(true, latched, false) + ", " + theirs + "; no data flows between the two";
+}
+
+Result<Identity, Problem> find_identity(const std::string& folder) {
+  const std::filesystem::path at = std::filesystem::absolute(folder);
+  Identity i;
+  for (const auto& [file, name] :
+       {std::pair{&i.ca, "ca.pem"}, std::pair{&i.certificate, "cert.pem"}, std::pair{&i.key, "key.pem"},
+        std::pair{&i.governance, "governance.p7s"}, std::pair{&i.permissions_ca, "ca.pem"},
+        std::pair{&i.permissions, "permissions.p7s"}}) {
+    *file = (at / name).string();
+    if (!std::filesystem::is_regular_file(*file))
+      return Problem{"security", "= " + folder + ", has no " + name + "; deploy/security/make makes one"};
+  }
+  return i;
+}
+
+Result<Server, Problem> parse_server(const std::string& text) {
+  Server s;
+  const auto colon = text.find(':');
+  s.address = text.substr(0, colon);
+  bool good = is_ipv4(s.address);
+  if (colon != std::string::npos) {
+    const char *begin = text.data() + colon + 1, *end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(begin, end, s.port);
+    good = good && error == std::errc() && rest == end && s.port > 0 && s.port < 65536;
+  }
+  if (good) return s;
+  return Problem{"discovery server", "= " + text + ", must be an IPv4 address, or ADDRESS:PORT"};
 }
 
 }  // namespace hamel::bus

@@ -45,7 +45,33 @@ Result<int, Problem> free_participant_index(std::uint32_t domain);
 /// The QoS a peer may disagree with, by its number in the DDS specification.
 const char* policy_name(int id);
 
-/// One sentence for a user: which topic, which policy, both sides.
-std::string incompatible_sentence(const Topic& topic, bool we_write, int policy, Vendor vendor);
+/// What writers promise to those that ask: to write at least once in `stale`, to say that they live.
+inline constexpr std::chrono::milliseconds kAlive{1000};
+/// What those that ask allow beyond it: on the wire a time is a binary fraction, rounded by each vendor its
+/// way.
+inline constexpr std::chrono::milliseconds kRounding{1};
+
+/// An end of ours and a peer cannot agree: kept by the vendor's thread, told by the owner's.
+struct Disagreement {
+  const Topic* topic = nullptr;
+  bool we_write = false;
+  int policy = 0;
+};
+
+/// One sentence for a user: which topic, which policy, both sides.  `known`: where the peer is looked up.
+std::string incompatible_sentence(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known);
+
+/// What is wrong with a folder of an identity, or its files by the names of deploy/security/make.
+struct Identity {
+  std::string ca, certificate, key, governance, permissions_ca, permissions;  ///< absolute paths
+};
+Result<Identity, Problem> find_identity(const std::string& folder);
+
+/// "10.0.0.1:11811" or "10.0.0.1" (port 11811).
+struct Server {
+  std::string address;
+  int port = 11811;
+};
+Result<Server, Problem> parse_server(const std::string& text);
 
 }  // namespace hamel::bus

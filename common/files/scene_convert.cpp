@@ -96,6 +96,7 @@ void read_dynamics(const Fields& read, scene::DynamicsOptions& o, std::string& b
   read("max_subdivisions", o.max_subdivisions);
   read("stop_stiffness", o.stop_stiffness);
   read("space", o.space);
+  read("on_silence", o.on_silence);
   read("bus", bus);
 }
 
@@ -238,6 +239,8 @@ void read_perception(const text::Perception& m, SceneParts& out) {
   stream("start_s", s.start_s);
   stream("loop", s.loop);
   stream("glitch_mps", s.glitch_mps);
+  stream("until_s", s.until_s);
+  stream("topic", s.topic);
   out.stream_start_given = m.stream().has_start_s();
 }
 

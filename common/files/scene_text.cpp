@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/files/scene_convert.h"
+#include "common/files/stream.h"
 #include "common/files/text_fields.h"
 #include "common/scene/reduce.h"
 
@@ -59,16 +60,16 @@ class Loader {
     if (!parts.perception.stream || parts.perception.stream->path.empty()) return;
     scene::Stream& s = *parts.perception.stream;
     s.path = beside(s.path);
-    const auto text = read_file(s.path);
-    if (!text)
-      return note({{"perception.stream.path", "= \"" + s.path + "\": " + text.error().front().what}});
-    auto samples = scene::parse_stream(text.value(), s.path);
-    if (!samples) {
-      found_.insert(found_.end(), samples.error().begin(), samples.error().end());
+    if (std::error_code e; !std::filesystem::exists(s.path, e))
+      return note({{"perception.stream.path", "= \"" + s.path + "\": no such file"}});
+    auto read = load_stream(s.path, s.topic);
+    if (!read) {
+      found_.insert(found_.end(), read.error().begin(), read.error().end());
       return;
     }
-    s.samples = std::move(samples).value();
-    if (!parts.stream_start_given) s.start_s = s.samples.front().t_s;
+    s.samples = std::move(read.value().samples);
+    s.empty_s = std::move(read.value().empty_s);
+    if (!parts.stream_start_given) s.start_s = read.value().first_s;
   }
 
   std::optional<scene::Robot> read_robot(const SceneParts& parts) {
@@ -119,7 +120,8 @@ class Loader {
 
   /// True for a consequence of a problem that was already noted.
   static bool is_said(const std::string& path, const scene::Scene& s, bool real_robot) {
-    if (path == "perception.stream.path") return s.perception.stream->samples.empty();
+    if (path == "perception.stream.path")
+      return s.perception.stream->samples.empty() && s.perception.stream->empty_s.empty();
     const bool of_joints = path.starts_with("q0") || path.starts_with("qd0") ||
                            path.starts_with("goal.joints") || path.starts_with("locked") ||
                            path == "planner.kc";

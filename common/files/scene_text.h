@@ -17,7 +17,7 @@ namespace hamel::files {
 /// @return a scene that passes scene::problems(), or every problem: `where` is "path:line:column" (from 1,
 /// tabs
 ///         count to the next multiple of 8) or "--set override"; those of a robot or stream name that file
-/// Reads the robot's URDF and the stream's CSV too.  Never throws for what a file holds.
+/// Reads the robot's URDF and the stream's file too.  Never throws for what a file holds.
 /// The scene comes reduced to what it requires (common/scene/reduce.h): a pure function of the scene, so
 /// that every process that loads the same file models the same.
 Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides = {});

@@ -53,7 +53,8 @@ class Builder {
     auto chain = model::build(spec_);
     if (!chain) return chain.error();
     return scene::Robot{spec_.name,         std::move(text),      std::move(chain).value(),
-                        std::move(shapes_), std::move(warnings_), fixed_joints_};
+                        std::move(shapes_), std::move(warnings_), {},
+                        fixed_joints_};
   }
 
  private:
@@ -150,14 +151,15 @@ class Builder {
   std::map<int, std::string> end_of_;        // one of them
 };
 
-/// The sidecar beside a URDF file; empty where there is none.
-Checked<Sidecar> read_sidecar(const std::string& urdf_path) {
+/// The sidecar beside a URDF file, and its text; empty where there is none.
+Checked<Sidecar> read_sidecar(const std::string& urdf_path, std::string& read) {
   std::filesystem::path path(urdf_path);
   path.replace_extension(".spheres.textproto");
   if (!std::filesystem::exists(path)) return Sidecar{};
   const auto text = read_file(path.string());
   if (!text) return text.error();
-  return parse_sidecar(text.value(), path.string());
+  read = text.value();
+  return parse_sidecar(read, path.string());
 }
 
 Checked<scene::Robot> make(const std::string& text, const std::string& name, const RobotPlace& place,
@@ -183,7 +185,10 @@ Checked<scene::Robot> make(const std::string& text, const std::string& name, con
 Checked<scene::Robot> load_urdf(const std::string& path, const RobotPlace& place) {
   const auto text = read_file(path);
   if (!text) return text.error();
-  return make(text.value(), path, place, read_sidecar(path));
+  std::string spheres;
+  auto robot = make(text.value(), path, place, read_sidecar(path, spheres));
+  if (robot) robot.value().spheres = std::move(spheres);
+  return robot;
 }
 
 Checked<scene::Robot> parse_urdf(const std::string& text, const std::string& name, const RobotPlace& place,

@@ -91,7 +91,7 @@ inline Eigen::Matrix3d dexp_se2(const PlanarTwist& x) {
   A << 1, 0, 0, d.x(), s, -v, d.y(), v, s;
   return A;
 }
-/// Inverse of dexp_se2.  Poles at angle 2 pi k, k >= 1: pole_condition() tells how near.
+/// Inverse of dexp_se2.  At its poles, angle 2 pi k, k >= 1, not finite: pole_condition() tells how near.
 inline Eigen::Matrix3d dexp_inv_se2(const PlanarTwist& x) {
   const double t = x[0], a = 1 - t * t * cotc(t * t), b = 0.5 * t;
   Eigen::Matrix2d B;

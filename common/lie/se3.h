@@ -91,7 +91,7 @@ inline Eigen::Matrix3d dexp_coupling(const Twist& x) {
   const Eigen::Matrix3d W = hat(x.head<3>()), P = hat(x.tail<3>());
   const Eigen::Matrix3d WP = W * P, PW = P * W, WPW = WP * W;
   return 0.5 * P + sinc3(t2) * (WP + PW + WPW) + cosc4(t2) * (W * WP + PW * W - 3 * WPW) +
-         0.5 * (cosc4(t2) - 3 * sinc5(t2)) * (WPW * W + W * WPW);
+         0.5 * cosc6(t2) * (WPW * W + W * WPW);
 }
 /// d/dt exp(x(t)) = hat(dexp(x) xdot) exp(x), dexp(x) = sum ad_x^k / (k+1)!; body twists use dexp(-x).  Eq.
 /// (2).
@@ -101,7 +101,7 @@ inline Matrix6 dexp_se3(const Twist& x) {
   A << J, Eigen::Matrix3d::Zero(), dexp_coupling(x), J;
   return A;
 }
-/// Inverse of dexp_se3.  Poles at angle 2 pi k, k >= 1.
+/// Inverse of dexp_se3.  At its poles, angle 2 pi k, k >= 1, not finite: pole_condition() tells how near.
 inline Matrix6 dexp_inv_se3(const Twist& x) {
   const Eigen::Matrix3d J = dexp_inv_so3(x.head<3>());
   Matrix6 A;

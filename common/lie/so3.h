@@ -61,7 +61,7 @@ inline Eigen::Matrix3d dexp_so3(const Eigen::Vector3d& phi) {
   return Eigen::Matrix3d::Identity() + cosc(x) * W + sinc3(x) * (W * W);
 }
 
-/// Inverse of dexp_so3.  Pole at |phi| = 2 pi k, k >= 1, where the caller gets inf or nan.
+/// Inverse of dexp_so3.  At its poles, |phi| = 2 pi k, k >= 1, not finite: pole_condition() tells how near.
 inline Eigen::Matrix3d dexp_inv_so3(const Eigen::Vector3d& phi) {
   const Eigen::Matrix3d W = hat(phi);
   return Eigen::Matrix3d::Identity() - 0.5 * W + cotc(phi.squaredNorm()) * (W * W);

@@ -101,6 +101,32 @@ void frame_jacobian(const model::Chain& chain, const Workspace& ws, int link, co
   }
 }
 
+void space_jacobian(const model::Chain& chain, const Workspace& ws, int link, Ref<MatrixXd> J) noexcept {
+  frame_jacobian(chain, ws, link, Eigen::Vector3d::Zero(), J);
+}
+
+void body_jacobian(const model::Chain& chain, const Workspace& ws, int link, Ref<MatrixXd> J) noexcept {
+  assert(J.rows() == 6 && J.cols() == chain.n() && link < chain.n());
+  J.setZero();
+  Pose X_iB;  // pose of `link` in link i
+  for (int i = link; i >= 0; --i) {
+    J.col(i) = lie::Ad_inv(X_iB, chain.A_B(i));
+    X_iB = ws.X_PB[at(i)] * X_iB;
+  }
+}
+
+void add_wrench(const model::Chain& chain, const Workspace& ws, int link, const Wrench& F_W,
+                Ref<VectorXd> tau) noexcept {
+  assert(tau.size() == chain.n() && link < chain.n());
+  Wrench F;  // on link i, in its frame
+  const Eigen::Matrix3d& R = ws.X_WB[at(link)].R;
+  F << R.transpose() * F_W.head<3>(), R.transpose() * F_W.tail<3>();
+  for (int i = link; i >= 0; --i) {
+    tau[i] += chain.A_B(i).dot(F);
+    F = lie::Ad_inv_T(ws.X_PB[at(i)], F);
+  }
+}
+
 Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link,
                                         const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept {
   assert(qd.size() == chain.n() && link < chain.n());

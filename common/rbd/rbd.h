@@ -43,6 +43,15 @@ void point_jacobian(const model::Chain& chain, const Workspace& ws, int link, co
 /// J (6 x n): twist of the frame at p_W on link `link`, world axes (omega, v of that point).
 void frame_jacobian(const model::Chain& chain, const Workspace& ws, int link, const Eigen::Vector3d& p_W,
                     Ref<MatrixXd> J) noexcept;
+/// J (6 x n): twist of link `link` in its own frame, V_B = J qd.  Column i is Ad(X_B_i) A_i of Eq. (5).
+void body_jacobian(const model::Chain& chain, const Workspace& ws, int link, Ref<MatrixXd> J) noexcept;
+/// J (6 x n): twist of link `link` in the world's frame (v: of the point that passes the world's origin).
+/// Column i is joint i's screw where it is now, Ad(X_WB_i) A_i.
+void space_jacobian(const model::Chain& chain, const Workspace& ws, int link, Ref<MatrixXd> J) noexcept;
+/// tau += J^T F: joint torques of a wrench on link `link` at its frame's origin, torque and force in world
+/// axes [N m], [N].  Add it to tau of forward_dynamics(), take it off tau of inverse_dynamics().
+void add_wrench(const model::Chain& chain, const Workspace& ws, int link, const lie::Wrench& F_W,
+                Ref<VectorXd> tau) noexcept;
 /// Acceleration of the point of `link` now at p_W when qdd = 0 (Jdot qd), world axes.  Needs velocities().
 Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link,
                                         const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept;
@@ -54,6 +63,10 @@ void gravity_torque(const model::Chain& chain, const Workspace& ws, Ref<VectorXd
 /// tau may be qdd.  What positions() and velocities() left in the workspace stays.
 void inverse_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,
                       Ref<const VectorXd> qdd, Workspace& ws, Ref<VectorXd> tau) noexcept;
+/// c(q, qd): torque of Coriolis and centrifugal forces, without gravity, damping and acceleration.  O(n).  c
+/// must not be qd.  What positions() and velocities() left in the workspace stays.
+void bias_torque(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd, Workspace& ws,
+                 Ref<VectorXd> c) noexcept;
 /// qdd from tau by the articulated-body sweep, O(n).  Joint damping acts.  qdd may be tau.
 /// What positions() and velocities() left in the workspace stays.
 void forward_dynamics(const model::Chain& chain, Ref<const VectorXd> q, Ref<const VectorXd> qd,

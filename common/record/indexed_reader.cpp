@@ -17,6 +17,7 @@ Result<IndexedReader, Problem> IndexedReader::open(const std::string& path) {
 
 std::optional<Problem> IndexedReader::load() {
   const auto fail = [this](const std::string& what) { return Problem{file_->path(), what}; };
+  constexpr std::uint64_t kMostSummary = 1ull << 30;  // weeks of recording
   constexpr std::uint64_t kTail = kFrame + kFooterBytes + kMagic.size();
   Bytes head, tail, summary;
   if (!file_->read(0, kMagic.size() + kFrame, head) ||
@@ -30,7 +31,8 @@ std::optional<Problem> IndexedReader::load() {
   const auto crc = footer.get<std::uint32_t>();
   const std::uint64_t footer_at = file_->size() - kTail;
   if (start == 0) return fail("has no summary; hamel log recover makes one");
-  if (start > footer_at || footer_at - start > kMaxRecord || !file_->read(start, footer_at - start, summary))
+  if (start > footer_at || footer_at - start > kMostSummary ||
+      !file_->read(start, footer_at - start, summary))
     return fail("has a broken footer; hamel log recover makes a new index");
   const std::uint32_t computed = crc32(View(tail).first(kFrame + 16), crc32(summary));
   if (crc != 0 && crc != computed)

@@ -4,14 +4,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 namespace hamel::record {
 
 Result<std::unique_ptr<Writer>, Problem> Writer::create(const std::string& path,
                                                         const WriterOptions& options) {
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (fd < 0) return Problem{path, std::string("cannot write: ") + std::strerror(errno)};
   std::unique_ptr<Writer> w(new Writer(path, fd, options));
   Bytes head;
@@ -107,23 +109,18 @@ bool Writer::put_chunk() {
     return false;
   }
   record_.clear();
-  const std::string name = name_in_file(options_.compression);
-  append(record_, Chunk{begin_, end_, chunk_.size(), crc32(chunk_), name, packed_});
-  ChunkIndex index{begin_, end_, offset_, record_.size(), {}, 0, name, packed_.size(), chunk_.size()};
+  append(record_,
+         Chunk{begin_, end_, chunk_.size(), crc32(chunk_), name_in_file(options_.compression), packed_});
   for (auto& [channel, entries] : entries_) {
     if (entries.empty()) continue;
     std::stable_sort(entries.begin(), entries.end(),
                      [](const Entry& a, const Entry& b) { return a.first < b.first; });
-    index.channels.emplace_back(channel, offset_ + record_.size());
     append_record(record_, Op::message_index, [&](Out& o) {
       o.put(channel), o.put(static_cast<std::uint32_t>(entries.size() * 16));
       for (const auto& [time, at] : entries) o.put(time), o.put(at);
     });
   }
-  index.index_length = record_.size() - index.length;
-  if (!put(record_)) return false;
-  chunks_.push_back(std::move(index));
-  return true;
+  return put(record_);
 }
 
 void Writer::count_chunk() {
@@ -131,6 +128,7 @@ void Writer::count_chunk() {
   statistics_.begin = std::min(statistics_.begin, begin_);
   statistics_.end = std::max(statistics_.end, end_);
   statistics_.messages += in_chunk_;
+  ++statistics_.chunks;
   for (const auto& [channel, entries] : entries_) counts_[channel] += entries.size();
 }
 
@@ -162,20 +160,72 @@ bool Writer::close() {
   return !problem_;
 }
 
+/// One kind of record, and where it stands.
+template <class Fill>
+void Writer::put_group(Op op, Bytes& offsets, Fill&& fill) {
+  const std::uint64_t at = offset_;
+  record_.clear();
+  fill();
+  put(record_);
+  if (offset_ == at) return;
+  append_record(offsets, Op::summary_offset, [&](Out& o) { o.put(op), o.put(at), o.put(offset_ - at); });
+}
+
+/// The index of every chunk before `end`, from the heads of the records in the file.
+void Writer::put_indexes(std::uint64_t end) {
+  constexpr std::size_t kHead = kFrame + kChunkHead + 4;
+  constexpr std::size_t kBlock = 1 << 16;
+  std::optional<ChunkIndex> chunk;
+  const auto finish = [&] {
+    if (chunk) append(record_, *chunk);
+    chunk.reset();
+    if (record_.size() < kBlock) return;
+    put(record_);
+    record_.clear();
+  };
+  std::array<std::byte, kHead> head;
+  for (std::uint64_t at = kMagic.size(); at < end && !problem_;) {
+    const ssize_t n = ::pread(fd_, head.data(), head.size(), static_cast<off_t>(at));
+    if (n < static_cast<ssize_t>(kFrame)) break;
+    Cursor in(View(head).first(static_cast<std::size_t>(n)));
+    const auto op = in.get<Op>();
+    const auto length = in.get<std::uint64_t>();
+    if (op == Op::message_index && chunk) {
+      chunk->channels.emplace_back(in.get<std::uint16_t>(), at);
+      chunk->index_length += kFrame + length;
+    } else {
+      finish();
+    }
+    if (op == Op::chunk) {
+      ChunkIndex& c = chunk.emplace();
+      c.begin = in.get<std::uint64_t>(), c.end = in.get<std::uint64_t>();
+      c.offset = at, c.length = kFrame + length;
+      c.uncompressed_size = in.get<std::uint64_t>();
+      in.get<std::uint32_t>();
+      c.compression = in.text();
+      c.compressed_size = in.get<std::uint64_t>();
+    }
+    at += kFrame + length;
+  }
+  finish();
+}
+
+/// Gives up everything from `end` on.
+void Writer::cut(std::uint64_t end) {
+  (void)!::ftruncate(fd_, static_cast<off_t>(end));
+  ::lseek(fd_, static_cast<off_t>(end), SEEK_SET);
+  offset_ = end;
+}
+
 void Writer::put_summary() {
+  const std::uint64_t data_end = offset_;
+  const bool sound = !problem_;
+  const std::optional<Problem> before = std::exchange(problem_, std::nullopt);
   record_.clear();
   append_record(record_, Op::data_end, [&](Out& o) { o.put(crc_); });
-  const std::uint64_t start = offset_ + record_.size();
-  const std::size_t skipped = record_.size();
-  Bytes offsets;
-  const auto group = [&](Op op, auto&& fill) {
-    const std::size_t at = record_.size();
-    fill();
-    if (record_.size() == at) return;
-    append_record(offsets, Op::summary_offset, [&](Out& o) {
-      o.put(op), o.put(offset_ + at), o.put(static_cast<std::uint64_t>(record_.size() - at));
-    });
-  };
+  put(record_);
+  const std::uint64_t start = offset_;
+  crc_ = 0;
   // Those that no chunk holds are not in the data, so neither in the summary.
   schemas_.resize(schemas_out_);
   channels_.resize(channels_out_);
@@ -183,31 +233,32 @@ void Writer::put_summary() {
   statistics_.channels = static_cast<std::uint32_t>(channels_.size());
   statistics_.attachments = static_cast<std::uint32_t>(attachments_.size());
   statistics_.metadata = static_cast<std::uint32_t>(metadata_.size());
-  statistics_.chunks = static_cast<std::uint32_t>(chunks_.size());
   statistics_.by_channel.assign(counts_.begin(), counts_.end());
-  group(Op::schema, [&] {
+  Bytes offsets;
+  put_group(Op::schema, offsets, [&] {
     for (const Schema& s : schemas_) append(record_, s);
   });
-  group(Op::channel, [&] {
+  put_group(Op::channel, offsets, [&] {
     for (const Channel& c : channels_) append(record_, c);
   });
-  group(Op::statistics, [&] { append(record_, statistics_); });
-  group(Op::chunk_index, [&] {
-    for (const ChunkIndex& c : chunks_) append(record_, c);
-  });
-  group(Op::attachment_index, [&] {
+  put_group(Op::statistics, offsets, [&] { append(record_, statistics_); });
+  put_group(Op::chunk_index, offsets, [&] { put_indexes(data_end); });
+  put_group(Op::attachment_index, offsets, [&] {
     for (const Place& p : attachments_) append_place(record_, Op::attachment_index, p);
   });
-  group(Op::metadata_index, [&] {
+  put_group(Op::metadata_index, offsets, [&] {
     for (const Place& p : metadata_) append_place(record_, Op::metadata_index, p);
   });
-  const std::uint64_t offsets_start = offset_ + record_.size();
+  const std::uint64_t offsets_start = offset_;
+  put(offsets);
+  record_.clear();
   Out o(record_);
-  o.raw(offsets);
   o.put(Op::footer), o.put(std::uint64_t{kFooterBytes}), o.put(start), o.put(offsets_start);
-  o.put(crc32(View(record_).subspan(skipped)));
+  o.put(crc32(record_, crc_));
   o.raw(std::as_bytes(std::span(kMagic)));
   put(record_);
+  if (problem_) cut(data_end);
+  if (!sound) problem_ = before;
 }
 
 }  // namespace hamel::record

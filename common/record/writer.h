@@ -21,10 +21,11 @@ struct WriterOptions {
 };
 
 /// One file, one thread.  Everything goes out in whole chunks, each with its message index, so that a process
-/// that is killed loses at most what is younger than `flush_every`.  Memory: one chunk, plus some 300 bytes
-/// for each chunk written (the index).  When the disk refuses, the file is cut back to its last whole record,
-/// the reason is kept in problem(), and everything later is counted as refused; close() still tries to write
-/// the summary.
+/// that is killed loses at most what is younger than `flush_every`.  Memory: one chunk, however long the file
+/// gets; the index of the chunks is gathered from the file when it is closed.  When the disk refuses, the
+/// file is cut back to its last whole record, the reason is kept in problem(), and everything later is
+/// counted as refused; close() still tries to write the summary.  What cannot be read back (a pipe) gets no
+/// index.
 class Writer {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -63,13 +64,17 @@ class Writer {
   bool put_chunk();
   void count_chunk();
   void put_summary();
+  template <class Fill>
+  void put_group(Op op, Bytes& offsets, Fill&& fill);
+  void put_indexes(std::uint64_t end);
+  void cut(std::uint64_t end);
 
   const std::string path_;
   const WriterOptions options_;
   int fd_;
   bool closed_ = false;
   std::uint64_t offset_ = 0;  ///< where the next record goes; everything before is whole
-  std::uint32_t crc_ = 0;     ///< of everything before
+  std::uint32_t crc_ = 0;     ///< of everything before; of the summary, once that has begun
   std::optional<Problem> problem_;
 
   Bytes chunk_, packed_, record_;
@@ -81,7 +86,6 @@ class Writer {
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
   std::size_t schemas_out_ = 0, channels_out_ = 0;  ///< those that a chunk holds already
-  std::vector<ChunkIndex> chunks_;
   std::vector<Place> attachments_, metadata_;
   std::map<std::uint16_t, std::uint64_t> counts_;
   Statistics statistics_;

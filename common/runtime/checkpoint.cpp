@@ -11,6 +11,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "common/runtime/log.h"
+
 namespace hamel::runtime {
 
 namespace {
@@ -60,6 +62,20 @@ Result<std::unique_ptr<Checkpoint>, Problem> Checkpoint::open(const std::string&
   void* m = mmap(nullptr, c->length_, PROT_READ | PROT_WRITE, MAP_SHARED, c->fd_, 0);
   if (m == MAP_FAILED) return failed(path, "cannot map the checkpoint");
   c->map_ = static_cast<std::byte*>(m);
+  return c;
+}
+
+Result<std::unique_ptr<Checkpoint>, Problem> Checkpoint::resume(
+    const std::string& dir, const std::string& service, std::uint32_t arm, std::uint32_t kind,
+    std::size_t capacity, const std::function<bool(std::span<const std::byte>)>& restore) {
+  const std::string path = dir + "/" + service + "-" + std::to_string(arm) + ".checkpoint";
+  auto c = open(path, kind, capacity);
+  if (!c) return c;
+  std::string note;
+  const auto bytes = c.value()->load(note);
+  if (!note.empty()) spdlog::warn("{}: {}", path, note);
+  if (!bytes.empty() && !restore(bytes))
+    spdlog::warn("{}: of another scene or version, refused; starting afresh", path);
   return c;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -24,6 +25,12 @@ class Checkpoint {
   ~Checkpoint();
   Checkpoint(const Checkpoint&) = delete;
   Checkpoint& operator=(const Checkpoint&) = delete;
+
+  /// DIR/SERVICE-ARM.checkpoint, opened, and its newest whole payload given to `restore`, which refuses what
+  /// is of another scene or version.  What was passed over or refused is logged with the reason.
+  static Result<std::unique_ptr<Checkpoint>, Problem> resume(
+      const std::string& dir, const std::string& service, std::uint32_t arm, std::uint32_t kind,
+      std::size_t capacity, const std::function<bool(std::span<const std::byte>)>& restore);
 
   /// The newest whole payload; empty when there is none.  `note` says what was passed over and why, else
   /// empty.

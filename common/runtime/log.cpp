@@ -11,6 +11,7 @@ void start_log(const std::string& name, bool verbose) {
   auto logger = spdlog::stderr_color_mt(name, mode);
   logger->set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
   logger->set_level(verbose ? spdlog::level::debug : spdlog::level::info);
+  spdlog::set_error_handler([](const std::string&) {});  // a full disk under stderr stops nobody
   spdlog::set_default_logger(std::move(logger));
 }
 

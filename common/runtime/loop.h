@@ -21,6 +21,8 @@ class Service {
   virtual Clock::time_point due() const = 0;
   /// True when there is nothing left to do.
   virtual bool finished() const = 0;
+  /// What its end means for the process; asked when it has finished.
+  virtual int exit_code() const { return 0; }
   /// How many readers its main topics have, the fewest of them.
   virtual int readers() const { return 0; }
   /// Says goodbye on the bus; called once, when the loop has ended.

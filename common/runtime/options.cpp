@@ -15,7 +15,13 @@ void add_bus_options(CLI::App& app, BusOptions& o) {
   app.add_option("--bus", o.vendor, "inproc, fastdds or cyclonedds")->type_name("VENDOR");
   app.add_option("--domain", o.domain, "DDS domain, 0..232")->capture_default_str();
   app.add_option("--interface", o.interface_name, "network interface or address; loopback only unless named");
-  app.add_option("--peer", o.peers, "unicast address of a peer host; repeat")->type_name("ADDRESS");
+  app.add_option("--peer", o.peers, "unicast address of a peer host; repeat")
+      ->type_name("ADDRESS")
+      ->allow_extra_args(false);
+  app.add_option("--discovery-server", o.discovery_server, "of Fast DDS, instead of peers and multicast")
+      ->type_name("ADDRESS:PORT");
+  app.add_option("--security", o.security, "folder of an identity: authenticate and encrypt")
+      ->type_name("DIR");
 }
 
 void add_run_options(CLI::App& app, RunOptions& o) {
@@ -33,14 +39,41 @@ void add_run_options(CLI::App& app, RunOptions& o) {
       ->type_name("SECONDS");
   app.add_option("--state-dir", o.state_dir, "folder of the checkpoints that a restart resumes from");
   app.add_flag("-v,--verbose", o.verbose, "log more");
+  app.add_option("--priority", o.realtime_options.priority, "run under SCHED_FIFO with this priority")
+      ->check(CLI::Range(1, 99));
+  app.add_flag("--lock-memory", o.realtime_options.lock_memory, "keep all memory in RAM");
+  app.add_option("--cpu", o.realtime_options.cpu, "run on this processor only")->check(CLI::Range(0, 1023));
   add_bus_options(app, o.bus);
 }
 
-void add_readers_option(CLI::App& app, RunOptions& o) {
+void add_service_options(CLI::App& app, RunOptions& o) {
+  app.add_option("more", o.more_scenes, "scenes of other arms, run in the same process")->type_name("SCENE");
+  app.add_option("--strength", o.strength,
+                 "planner: of several for one arm the strongest that is heard drives it")
+      ->capture_default_str()
+      ->check(CLI::Range(0u, 65535u));
   app.add_option("--readers", o.readers,
                  "begin when so many readers are there (a recorder among them), or after 5 s")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N");
+}
+
+void append(const BusOptions& o, std::vector<std::string>& command) {
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) command.insert(command.end(), {name, value});
+  };
+  add("--bus", o.vendor);
+  add("--domain", std::to_string(o.domain));
+  add("--interface", o.interface_name);
+  for (const auto& p : o.peers) add("--peer", p);
+  add("--discovery-server", o.discovery_server);
+  add("--security", o.security);
+}
+
+void append(const RealtimeOptions& o, std::vector<std::string>& command) {
+  if (o.priority > 0) command.insert(command.end(), {"--priority", std::to_string(o.priority)});
+  if (o.lock_memory) command.push_back("--lock-memory");
+  if (o.cpu >= 0) command.insert(command.end(), {"--cpu", std::to_string(o.cpu)});
 }
 
 Checked<scene::Scene> load(const RunOptions& o) {
@@ -72,12 +105,16 @@ Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const
   n.domain = o.domain;
   n.interface_name = o.interface_name;
   n.peers = o.peers;
+  n.discovery_server = o.discovery_server;
+  n.security = o.security;
   n.name = name;
+  n.log = [](const std::string& sentence) { spdlog::warn("{}", sentence); };
   return bus::open(n);
 }
 
 int complain(const std::string& program, const Problems& problems) {
-  for (const auto& p : problems) fmt::print(stderr, "{}: {}\n", program, to_string(p));
+  // Not fmt::print: it throws where stderr is a full disk.
+  for (const auto& p : problems) std::fputs((program + ": " + to_string(p) + "\n").c_str(), stderr);
   return kBadInput;
 }
 

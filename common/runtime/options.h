@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/runtime/realtime.h"
 #include "common/scene/scene.h"
 
 namespace hamel::runtime {
@@ -26,6 +27,8 @@ struct BusOptions {
   std::uint32_t domain = bus::NodeOptions{}.domain;
   std::string interface_name;
   std::vector<std::string> peers;
+  std::string discovery_server;  ///< Fast DDS only
+  std::string security;          ///< folder of an identity
 };
 
 /// Options of a run of a scene.
@@ -36,14 +39,20 @@ struct RunOptions {
   bool lockstep = false, realtime = false;  ///< at most one; neither: the program's default
   double duration_s = -1;                   ///< < 0: the scene's, or for a lone service: until told to end
   std::string state_dir;                    ///< checkpoints; empty: none
-  int readers = 0;                          ///< a lone service: begin when its topics have so many readers
+  RealtimeOptions realtime_options;
+  std::vector<std::string> more_scenes;  ///< a lone service: other arms in the same process
+  std::uint32_t strength = 0;            ///< a lone planner: the stronger of two drives the arm
+  int readers = 0;                       ///< a lone service: begin when its topics have so many readers
   bool verbose = false;
 };
 
 void add_bus_options(CLI::App& app, BusOptions& o);
 void add_run_options(CLI::App& app, RunOptions& o);
 /// Of a service in its own process.
-void add_readers_option(CLI::App& app, RunOptions& o);
+void add_service_options(CLI::App& app, RunOptions& o);
+/// The bus and real-time options as a service's command line takes them.
+void append(const BusOptions& o, std::vector<std::string>& command);
+void append(const RealtimeOptions& o, std::vector<std::string>& command);
 
 /// The scene of these options, or every problem.  A --duration replaces the scene's.
 Checked<scene::Scene> load(const RunOptions& o);

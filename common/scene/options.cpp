@@ -118,6 +118,16 @@ const char* to_string(Space v) {
   return "?";
 }
 
+const char* to_string(Safe v) {
+  switch (v) {
+    case Safe::hold:
+      return "hold";
+    case Safe::brake:
+      return "brake";
+  }
+  return "?";
+}
+
 const char* to_string(Method v) {
   switch (v) {
     case Method::attract:

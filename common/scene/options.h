@@ -17,6 +17,7 @@ enum class Tier : std::uint8_t { hamel, midpoint, gauss, semi_implicit_euler, rk
 enum class Root : std::uint8_t { feedback, newton };
 enum class Start : std::uint8_t { extrapolated, previous };
 enum class Space : std::uint8_t { automatic, se3 };
+enum class Safe : std::uint8_t { hold, brake };  ///< keep the place, or only come to rest; gravity is held
 
 /// How the arm is integrated.
 struct DynamicsOptions {
@@ -31,7 +32,9 @@ struct DynamicsOptions {
   double tolerance_rel = 1e-10;  ///< dopri8: relative local error
   int max_iterations = 32;       ///< root-finding budget of one step, >= 1
   int max_subdivisions = 6;      ///< a step that does not converge is halved up to this often, 0..20
-  double stop_stiffness = 0;     ///< smooth hard stops at joint limits [N m/rad], 0: none
+  double stop_stiffness =
+      0;  ///< smooth hard stops at joint limits: k e^2/(e + 1e-3) at e beyond [N m/rad], 0: none
+  Safe on_silence = Safe::hold;  ///< what the arm does while its planner is silent
   Space space = Space::automatic;  ///< a planar arm is computed on SE(2), unless se3 is asked for
 };
 
@@ -122,6 +125,7 @@ const char* to_string(Tier v);
 const char* to_string(Root v);
 const char* to_string(Start v);
 const char* to_string(Space v);
+const char* to_string(Safe v);
 const char* to_string(Method v);
 const char* to_string(GainForm v);
 const char* to_string(Mapping v);

@@ -113,7 +113,12 @@ void check_stream(Rules& r, const PerceptionOptions& o) {
   r.positive("stream.rate", s.rate);
   r.positive("stream.glitch_mps", s.glitch_mps);
   if (!std::isfinite(s.start_s)) r.fail("stream.start_s", "is not finite");
-  if (s.samples.empty()) r.fail("stream.path", "has no samples");
+  if (s.samples.empty() && s.empty_s.empty()) r.fail("stream.path", "has no samples");
+  double first_s = std::numeric_limits<double>::infinity();
+  for (const StreamSample& sample : s.samples) first_s = std::min(first_s, sample.t_s);
+  for (const double t_s : s.empty_s) first_s = std::min(first_s, t_s);
+  r.must(s.until_s >= first_s || std::isinf(first_s), "stream.until_s", s.until_s,
+         ">= the time of the first sample, " + std::to_string(first_s));
   std::set<std::uint32_t> ids;
   for (const StreamSample& sample : s.samples) ids.insert(sample.id);
   if (ids.size() + o.obstacles.size() > kMaxObstacles)

@@ -30,8 +30,9 @@ struct Robot {
   model::Chain chain;
   std::vector<LinkShape> shapes;
   std::vector<std::string> warnings =
-      {};                ///< what was read otherwise than written, e.g. "link hand: mesh left out"
-  int fixed_joints = 0;  ///< of the file, lumped
+      {};                    ///< what was read otherwise than written, e.g. "link hand: mesh left out"
+  std::string spheres = {};  ///< text of the sidecar with collision spheres; empty: none
+  int fixed_joints = 0;      ///< of the file, lumped
 };
 
 enum class GoalKind : std::uint8_t { position, pose, joints };
@@ -54,16 +55,20 @@ struct ScriptedObstacle {
   double phase_rad = 0;
 };
 
-/// A recorded obstacle stream, CSV t_s,id,x_m,y_m,z_m,radius_m, placed in the world.
+/// A recorded obstacle stream, placed in the world: CSV t_s,id,x_m,y_m,z_m,radius_m, or the obstacle sets of
+/// a recording (MCAP).
 struct Stream {
-  std::string path;                   ///< as found: absolute, or relative to the working directory
-  lie::Pose X_WS;                     ///< stream frame in the world
-  double scale = 1;                   ///< of lengths, > 0
-  double rate = 1;                    ///< stream seconds per run second, > 0
-  double start_s = 0;                 ///< stream time at run time 0
+  std::string path;                 ///< as found: absolute, or relative to the working directory
+  std::string topic = "obstacles";  ///< of a recording, full or short name
+  lie::Pose X_WS;                   ///< stream frame in the world
+  double scale = 1;                 ///< of lengths, > 0
+  double rate = 1;                  ///< stream seconds per run second, > 0
+  double start_s = 0;               ///< stream time at run time 0
+  double until_s = std::numeric_limits<double>::infinity();  ///< later samples are left out, >= the first's
   bool loop = false;                  ///< begins anew, one sample interval behind its end
   double glitch_mps = 10;             ///< a larger speed between two samples is taken for a wrong sample, > 0
   std::vector<StreamSample> samples;  ///< what the file holds, in stream frame and stream time
+  std::vector<double> empty_s;        ///< times at which it says that nothing is there
 };
 
 /// What a sensor does to the truth, on purpose: to test the planner.  Same seed, same flaws.

@@ -53,14 +53,14 @@ class Reader {
     ok &= read(cells[2], "x_m", sample_.p_m.x());
     ok &= read(cells[3], "y_m", sample_.p_m.y());
     ok &= read(cells[4], "z_m", sample_.p_m.z());
-    ok &= read(cells[5], "radius_m", sample_.radius_m);
+    ok &= read(cells[5], "radius_m", sample_.shape.dims_m[0]);
     return ok && follows_rules(cells[0], cells[5]);
   }
 
   bool follows_rules(std::string_view t, std::string_view radius) {
     if (!samples_.empty() && sample_.t_s < samples_.back().t_s)
       return fail("t_s = " + std::string(t) + ", time goes backwards");
-    if (sample_.radius_m < 0) return fail("radius_m = " + std::string(radius) + ", must be >= 0");
+    if (sample_.shape.dims_m[0] < 0) return fail("radius_m = " + std::string(radius) + ", must be >= 0");
     if (samples_.empty() || sample_.t_s > samples_.back().t_s) ids_now_.clear();
     if (!ids_now_.insert(sample_.id).second)
       return fail("id " + std::to_string(sample_.id) + " occurs twice at t_s = " + std::string(t));

@@ -14,7 +14,10 @@ class Publisher {
   explicit Publisher(bus::Node& node) : writer_(node.writer(topic_of<T>())) {}
   /// False when the message could not be encoded or the bus refused it.
   bool publish(const T& m) { return encode(m, buffer_) && writer_->write(buffer_); }
+  /// Says that the arm (the key) of `m` is no longer ours to speak of.
+  bool dispose(const T& m) { return encode(m, buffer_) && writer_->dispose(buffer_); }
   int matched() const { return writer_->matched(); }
+  bus::WriterId id() const { return writer_->id(); }
 
  private:
   std::unique_ptr<bus::Writer> writer_;
@@ -37,6 +40,8 @@ class Subscription {
     return false;
   }
 
+  /// The writer of what take() gave last.
+  bus::WriterId from() const { return reader_->from(); }
   int matched() const { return reader_->matched(); }
   bus::Counters counters() const { return reader_->counters(); }
   std::uint64_t undecodable() const { return undecodable_; }

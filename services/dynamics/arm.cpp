@@ -30,10 +30,8 @@ Arm::Arm(const scene::Scene& scene)
       ws_(scene.robot.chain) {
   const model::Chain& chain = integrator_.chain();
   const int n = chain.n();
-  tau_ = tau_gravity_ = pull_ = Eigen::VectorXd::Zero(n);
+  tau_ = tau_hold_ = tau_gravity_ = pull_ = Eigen::VectorXd::Zero(n);
   q_hold_ = state_.q;
-  effort_.resize(n);
-  for (int i = 0; i < n; ++i) effort_[i] = chain.joint(i).limits.effort;
   gravity_works_ = gravity_works(integrator_, state_.q);
   scale_J_ = gravity_works_ ? rbd::energy_scale(chain) : 0;
   brake_per_s_ = brake_rate(options_.dt_s);
@@ -43,9 +41,10 @@ Arm::Arm(const scene::Scene& scene)
 }
 
 void Arm::drive_torque(const Drive& drive) noexcept {
-  const bool hold = drive.kind == DriveKind::hold;
+  const bool hold = drive.kind == DriveKind::hold || (drive.kind == DriveKind::torque && drive.share < 1);
   if (hold && !holding_) q_hold_ = state_.q;
   holding_ = hold;
+  if (hold) hold_torque();
   switch (drive.kind) {
     case DriveKind::free:
       tau_.setZero();
@@ -56,34 +55,28 @@ void Arm::drive_torque(const Drive& drive) noexcept {
         integrator_.gravity_torque(state_.q, tau_gravity_);
         tau_ += tau_gravity_;
       }
+      if (hold) tau_ = drive.share * tau_ + (1 - drive.share) * tau_hold_;
       return;
     case DriveKind::brake:
       integrator_.gravity_torque(state_.q, tau_);
       tau_ -= brake_per_s_ * state_.p;
       return;
-    case DriveKind::hold: {
-      // Critically damped about the place where holding began: M qdd = -(b/2)^2 M (q - q_hold) - b p.
-      pull_ = (-0.25 * brake_per_s_ * brake_per_s_) * (state_.q - q_hold_);
-      tau_gravity_.setZero();
-      rbd::inverse_dynamics(integrator_.chain(), state_.q, tau_gravity_, pull_, ws_, tau_);
-      tau_ -= brake_per_s_ * state_.p;
+    case DriveKind::hold:
+      tau_ = tau_hold_;
       return;
-    }
   }
 }
 
-void Arm::saturate() noexcept {
-  saturated_ = false;
-  for (Eigen::Index i = 0; i < tau_.size(); ++i) {
-    const double cut = std::clamp(tau_[i], -effort_[i], effort_[i]);
-    saturated_ |= cut != tau_[i];
-    tau_[i] = cut;
-  }
+/// Critically damped about the place where holding began: M qdd = -(b/2)^2 M (q - q_hold) - b p.
+void Arm::hold_torque() noexcept {
+  pull_ = (-0.25 * brake_per_s_ * brake_per_s_) * (state_.q - q_hold_);
+  tau_gravity_.setZero();
+  rbd::inverse_dynamics(integrator_.chain(), state_.q, tau_gravity_, pull_, ws_, tau_hold_);
+  tau_hold_ -= brake_per_s_ * state_.p;
 }
 
 bool Arm::advance(const Drive& drive) noexcept {
   drive_torque(drive);
-  saturate();
   report_ = integrator_.step(state_, tau_);
   if (!report_.usable()) return false;
   books_.work_J += report_.work_J;
@@ -104,10 +97,13 @@ double Arm::energy_drift_rel() const noexcept {
   return scale > 0 ? books_.drift_J / scale : 0;
 }
 
-void Arm::restore(const State& state, const Books& books) {
+void Arm::restore(const State& state, const Books& books, const Eigen::VectorXd& applied,
+                  const Eigen::VectorXd* held) {
   state_ = state;
+  tau_ = applied;
   books_ = books;
-  holding_ = false;
+  holding_ = held != nullptr;
+  if (held) q_hold_ = *held;
 }
 
 }  // namespace hamel::dynamics

@@ -22,6 +22,7 @@ struct Drive {
   DriveKind kind = DriveKind::free;
   const Eigen::VectorXd* torque_Nm = nullptr;  ///< kind torque: n values
   bool includes_gravity = false;
+  double share = 1;  ///< kind torque: of the command; the rest is `hold`.  0..1
 };
 
 /// What a run came to so far.
@@ -46,8 +47,8 @@ class Arm {
 
   const State& state() const noexcept { return state_; }
   double t_s() const noexcept { return static_cast<double>(state_.step) * options_.dt_s; }
-  const Eigen::VectorXd& torque_applied() const noexcept { return tau_; }
-  bool torque_saturated() const noexcept { return saturated_; }
+  const Eigen::VectorXd& torque_applied() const noexcept { return integrator_.torque_applied(); }
+  bool torque_saturated() const noexcept { return report_.saturated > 0; }
   const StepReport& report() const noexcept { return report_; }
   const Books& books() const noexcept { return books_; }
   const Options& options() const noexcept { return options_; }
@@ -55,12 +56,16 @@ class Arm {
   /// energy where gravity does nothing; 0 where nothing moved.
   double energy_drift_rel() const noexcept;
 
-  /// Continues from a saved state and its books; exact.
-  void restore(const State& state, const Books& books);
+  /// The place that is held; none while nothing is held.
+  const Eigen::VectorXd* held() const noexcept { return holding_ ? &q_hold_ : nullptr; }
+  /// Continues from a saved state, its books, the torque that was applied and the place held (null: none);
+  /// exact.
+  void restore(const State& state, const Books& books, const Eigen::VectorXd& applied,
+               const Eigen::VectorXd* held);
 
  private:
   void drive_torque(const Drive& drive) noexcept;
-  void saturate() noexcept;
+  void hold_torque() noexcept;
   double kinetic_energy() const noexcept { return 0.5 * state_.p.dot(state_.qd); }
 
   Options options_;
@@ -68,9 +73,9 @@ class Arm {
   State state_;
   StepReport report_;
   Books books_;
-  Eigen::VectorXd tau_, tau_gravity_, effort_, q_hold_, pull_;
+  Eigen::VectorXd tau_, tau_hold_, tau_gravity_, q_hold_, pull_;
   rbd::Workspace ws_;
-  bool holding_ = false, saturated_ = false, gravity_works_ = false;
+  bool holding_ = false, gravity_works_ = false;
   double scale_J_ = 0, brake_per_s_ = 0;
 };
 

@@ -12,9 +12,8 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::uint32_t kCheckpointKind = 0x0101;  // dynamics, layout 1
-constexpr auto kRepeat = 100ms;                    // lockstep: say it again to peers that came late
-constexpr int kBurst = 64;  // steps before the other services of the process get their turn
+constexpr auto kRepeat = 100ms;  // lockstep: say it again to peers that came late
+constexpr int kBurst = 64;       // steps before the other services of the process get their turn
 
 runtime::Clock::duration seconds(double s) {
   return std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(s));
@@ -39,6 +38,8 @@ const char* to_string(Outcome v) {
       return "no_command";
     case Outcome::diverged:
       return "diverged";
+    case Outcome::not_alone:
+      return "not_alone";
   }
   return "?";
 }
@@ -48,19 +49,23 @@ Result<std::unique_ptr<DynamicsService>, Problem> DynamicsService::make(bus::Nod
                                                                         const ServiceConfig& config) {
   std::unique_ptr<DynamicsService> s(new DynamicsService(node, scene, config));
   if (config.state_dir.empty()) return s;
-  const std::string path = config.state_dir + "/dynamics-" + std::to_string(scene.arm) + ".checkpoint";
-  auto c = runtime::Checkpoint::open(path, kCheckpointKind,
-                                     4096 + static_cast<std::size_t>(scene.robot.chain.n()) * 512);
+  auto c = s->open_checkpoint();
   if (!c) return c.error();
   s->checkpoint_ = std::move(c).value();
-  std::string note;
-  const auto bytes = s->checkpoint_->load(note);
-  if (!note.empty()) spdlog::warn("{}: {}", path, note);
-  if (!bytes.empty() && s->load(bytes))
-    spdlog::info("resumed at step {} (t = {:.3f} s)", s->arm_.state().step, s->arm_.t_s());
-  else if (!bytes.empty())
-    spdlog::warn("{}: of another scene or version, refused; starting afresh", path);
   return s;
+}
+
+int DynamicsService::exit_code() const {
+  switch (outcome_) {
+    case Outcome::no_command:
+      return runtime::kNoData;
+    case Outcome::diverged:
+      return runtime::kFailed;
+    case Outcome::not_alone:
+      return runtime::kBadInput;
+    default:
+      return runtime::kDone;
+  }
 }
 
 DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, const ServiceConfig& config)
@@ -72,11 +77,11 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
       state_out_(node),
       clock_out_(node),
       summary_out_(node),
-      status_out_(node),
       robot_out_(node),
       command_in_(node),
       mode_in_(node),
-      bus_name_(bus::to_string(node.options().vendor)) {
+      clock_in_(node),
+      presence_(node, wire::ServiceKind::dynamics, scene.arm) {
   const double dt = scene.dynamics.dt_s;
   last_step_ = static_cast<std::uint64_t>(std::llround(scene.duration_s / dt));
   clock_every_ = static_cast<std::uint64_t>(std::max(1.0, std::floor(0.01 / dt + 1e-9)));
@@ -90,7 +95,7 @@ bool DynamicsService::poll(Time now) {
   if (finished()) return false;
   if (!started_) {
     started_ = true;
-    next_step_ = waiting_since_ = last_publish_ = now;
+    next_step_ = waiting_since_ = last_publish_ = last_poll_ = now;
     wire::RobotDescription d;
     d.arm = scene_.arm;
     d.name = scene_.robot.name;
@@ -102,6 +107,8 @@ bool DynamicsService::poll(Time now) {
     publish_clock(true);
     publish_state();
   }
+  meet_other_arms(now);
+  if (finished()) return true;
   take_modes();
   take_commands();
   const bool progressed = config_.pace == scene::Pace::lockstep ? poll_lockstep(now) : poll_realtime(now);
@@ -123,54 +130,6 @@ void DynamicsService::take_modes() {
     if (m.mode == wire::Mode::stop || m.mode == wire::Mode::hold) mode_ = m.mode;
     if (m.mode == wire::Mode::resume) mode_.reset();
   }
-}
-
-void DynamicsService::take_commands() {
-  while (command_in_.take(incoming_)) {
-    if (incoming_.arm != scene_.arm) continue;
-    if (!accept(incoming_)) {
-      ++commands_refused_;
-      continue;
-    }
-    command_ = incoming_.torque;
-    command_step_ = incoming_.step;
-    command_includes_gravity_ = incoming_.includes_gravity;
-    planner_state_ = incoming_.planner_state;
-    epoch_ = incoming_.epoch;
-    state_.caused_by.size = 0;
-    state_.caused_by.add(wire::ServiceKind::planner, incoming_.step);
-  }
-}
-
-/// A command must be of our size, answer a state of this incarnation that was published, be newer than the
-/// one that holds, and come from the planner with the largest epoch.
-bool DynamicsService::accept(const wire::TorqueCommand& c) {
-  if (c.torque.size() != command_.size()) {
-    if (refusals_(runtime::Clock::now()))
-      spdlog::warn("command for {} joints refused: arm {} has {}", c.torque.size(), scene_.arm,
-                   command_.size());
-    return false;
-  }
-  if (c.state_incarnation != incarnation_ || c.step > arm_.state().step) return false;
-  if (command_step_ && c.step <= *command_step_) return false;
-  return c.epoch >= epoch_ || owner_is_silent();
-}
-
-/// True when the planner that holds the arm has not been heard for longer than a command stays fresh: another
-/// may take over, whatever its epoch.
-bool DynamicsService::owner_is_silent() const {
-  if (!command_step_) return true;
-  if (config_.pace == scene::Pace::lockstep) return runtime::Clock::now() - waiting_since_ > 1s;
-  return command_age_s() > command_stale_s();
-}
-
-double DynamicsService::command_age_s() const {
-  return static_cast<double>(arm_.state().step - *command_step_) * scene_.dynamics.dt_s;
-}
-
-double DynamicsService::command_stale_s() const {
-  return std::max(std::chrono::duration<double>(topics::kCommand.stale).count(),
-                  3 * scene_.planner.period_steps * scene_.dynamics.dt_s);
 }
 
 bool DynamicsService::awaits_command() const {
@@ -197,6 +156,9 @@ bool DynamicsService::poll_lockstep(Time now) {
     progressed = true;
   }
   if (progressed) return true;
+  if (now - waiting_since_ > 1s && refusals_(now))
+    spdlog::warn("step {} waits for the planner of arm {}, {:.0f} s so far", arm_.state().step, scene_.arm,
+                 std::chrono::duration<double>(now - waiting_since_).count());
   if (now - waiting_since_ > config_.patience) {
     end(Outcome::no_command, fmt::format("no planner answered step {} within {} s", arm_.state().step,
                                          std::chrono::duration<double>(config_.patience).count()));
@@ -236,6 +198,7 @@ void DynamicsService::count_lateness(Time now) {
 
 /// Mode commands outrank the planner; a planner that is silent or absent leaves the arm holding still.
 Drive DynamicsService::choose_drive() {
+  if (mode_ || !command_step_) driven_from_.reset();
   if (mode_) {
     const bool stop = *mode_ == wire::Mode::stop;
     validity_ = stop ? wire::Validity::stopped : wire::Validity::holding;
@@ -251,11 +214,24 @@ Drive DynamicsService::choose_drive() {
   }
   if (config_.pace == scene::Pace::realtime && command_age_s() > command_stale_s()) {
     ++commands_missed_;
+    outages_ += validity_ == wire::Validity::valid;
     validity_ = wire::Validity::command_stale;
-    return {.kind = DriveKind::hold};
+    driven_from_.reset();
+    return {.kind = scene_.dynamics.on_silence == scene::Safe::hold ? DriveKind::hold : DriveKind::brake};
   }
   validity_ = wire::Validity::valid;
-  return {.kind = DriveKind::torque, .torque_Nm = &command_, .includes_gravity = command_includes_gravity_};
+  if (!driven_from_) driven_from_ = arm_.state().step;
+  return {.kind = DriveKind::torque,
+          .torque_Nm = &command_,
+          .includes_gravity = command_includes_gravity_,
+          .share = share()};
+}
+
+/// Real time: a command that follows a hold comes in over planner.ramp_s, so that nothing jumps.
+double DynamicsService::share() const {
+  if (config_.pace == scene::Pace::lockstep || !(scene_.planner.ramp_s > 0)) return 1;
+  const double driven_s = static_cast<double>(arm_.state().step - *driven_from_) * scene_.dynamics.dt_s;
+  return std::min(1.0, driven_s / scene_.planner.ramp_s);
 }
 
 bool DynamicsService::step() {
@@ -308,26 +284,20 @@ void DynamicsService::publish_summary(bool final_summary) {
 }
 
 void DynamicsService::publish_status(wire::ServiceState state) {
-  wire::ServiceStatus s;
-  s.kind = wire::ServiceKind::dynamics;
-  s.arm = scene_.arm;
-  s.incarnation = incarnation_;
-  s.version = runtime::version();
-  s.idl_hash = wire::idl_hash();
-  s.bus = bus_name_;
-  s.state = state;
-  s.detail = finished() ? to_string(outcome_) : wire::to_string(validity_);
-  s.counters = {{"steps", arm_.state().step},
-                {"commands_refused", commands_refused_},
-                {"commands_missed", commands_missed_},
-                {"deadlines_missed", deadlines_missed_},
-                {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}};
-  status_out_.publish(s);
+  presence_.say(runtime::Clock::now(),
+                {.state = state,
+                 .incarnation = incarnation_,
+                 .detail = finished() ? to_string(outcome_) : wire::to_string(validity_),
+                 .counters = {{"steps", arm_.state().step},
+                              {"outages", outages_},
+                              {"commands_refused", commands_refused_},
+                              {"commands_missed", commands_missed_},
+                              {"deadlines_missed", deadlines_missed_},
+                              {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}}});
 }
 
 void DynamicsService::publish_periodic(Time now) {
-  if (now - last_status_ >= 500ms) {
-    last_status_ = now;
+  if (presence_.due(now)) {
     publish_status(wire::ServiceState::ready);
     publish_summary(finished());
   }
@@ -343,52 +313,16 @@ void DynamicsService::end(Outcome outcome, const std::string& why) {
     spdlog::debug("{}", why);
   else
     spdlog::error("{}", why);
+  if (outcome == Outcome::not_alone) return;  // the arm's word is another's
   publish_clock(false);
   publish_summary(true);
 }
 
 void DynamicsService::close() {
+  if (outcome_ == Outcome::not_alone) return;
   publish_clock(false);
   publish_summary(true);
   publish_status(wire::ServiceState::stopping);
-}
-
-void DynamicsService::save() {
-  if (!checkpoint_) return;
-  runtime::Packer p(packed_);
-  const State& s = arm_.state();
-  p.put(fingerprint_);
-  p.put(incarnation_);
-  p.put(s.step);
-  p.put(s.q.data(), static_cast<std::size_t>(s.q.size()));
-  p.put(s.p.data(), static_cast<std::size_t>(s.p.size()));
-  p.put(s.qd.data(), static_cast<std::size_t>(s.qd.size()));
-  p.put(s.history.data(), s.history.size());
-  p.put(arm_.books());
-  p.put(hash_.digest());
-  p.put(mode_.has_value() ? static_cast<std::int32_t>(*mode_) : -1);
-  p.put(mode_id_);
-  checkpoint_->save(packed_);
-}
-
-bool DynamicsService::load(std::span<const std::byte> bytes) {
-  runtime::Unpacker u(bytes);
-  std::uint64_t print = 0, incarnation = 0, mode_id = 0;
-  State s;
-  Books books;
-  TrajectoryHash::Digest digest;
-  std::int32_t mode = -1;
-  const bool whole = u.get(print) && u.get(incarnation) && u.get(s.step) && u.get_doubles(s.q) &&
-                     u.get_doubles(s.p) && u.get_doubles(s.qd) && u.get_doubles(s.history) && u.get(books) &&
-                     u.get(digest) && u.get(mode) && u.get(mode_id) && u.at_end();
-  const Eigen::Index n = arm_.state().q.size();
-  if (!whole || print != fingerprint_ || s.q.size() != n || s.p.size() != n || s.qd.size() != n) return false;
-  incarnation_ = incarnation;
-  arm_.restore(s, books);
-  hash_.restore(digest);
-  if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
-  mode_id_ = mode_id;
-  return true;
 }
 
 }  // namespace hamel::dynamics

@@ -8,6 +8,7 @@
 #include "common/runtime/checkpoint.h"
 #include "common/runtime/log.h"
 #include "common/runtime/loop.h"
+#include "common/runtime/presence.h"
 #include "common/wire/endpoint.h"
 #include "services/dynamics/arm.h"
 #include "services/dynamics/trajectory_hash.h"
@@ -23,7 +24,7 @@ struct ServiceConfig {
 };
 
 /// How the run ended.
-enum class Outcome : std::uint8_t { running, done, no_command, diverged };
+enum class Outcome : std::uint8_t { running, done, no_command, diverged, not_alone };
 const char* to_string(Outcome v);
 
 class DynamicsService final : public runtime::Service {
@@ -34,6 +35,7 @@ class DynamicsService final : public runtime::Service {
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   bool finished() const override { return outcome_ != Outcome::running; }
+  int exit_code() const override;
   int readers() const override { return state_out_.matched(); }
   void close() override;
 
@@ -46,7 +48,10 @@ class DynamicsService final : public runtime::Service {
 
   void take_modes();
   void take_commands();
-  bool accept(const wire::TorqueCommand& c);
+  void meet_other_arms(Time now);
+  bool fits(const wire::TorqueCommand& c);
+  bool owns(const wire::TorqueCommand& c);
+  double share() const;
   bool poll_lockstep(Time now);
   bool poll_realtime(Time now);
   void count_lateness(Time now);
@@ -63,6 +68,7 @@ class DynamicsService final : public runtime::Service {
   void publish_status(wire::ServiceState state);
   void publish_periodic(Time now);
   void end(Outcome outcome, const std::string& why);
+  Result<std::unique_ptr<runtime::Checkpoint>, Problem> open_checkpoint();
   void save();
   bool load(std::span<const std::byte> bytes);
 
@@ -76,11 +82,11 @@ class DynamicsService final : public runtime::Service {
   wire::Publisher<wire::ArmState> state_out_;
   wire::Publisher<wire::SimulationClock> clock_out_;
   wire::Publisher<wire::RunSummary> summary_out_;
-  wire::Publisher<wire::ServiceStatus> status_out_;
   wire::Publisher<wire::RobotDescription> robot_out_;
   wire::Subscription<wire::TorqueCommand> command_in_;
   wire::Subscription<wire::ModeCommand> mode_in_;
-  std::string bus_name_;
+  wire::Subscription<wire::SimulationClock> clock_in_;
+  runtime::Presence presence_;
 
   wire::ArmState state_;
   wire::TorqueCommand incoming_;
@@ -89,13 +95,15 @@ class DynamicsService final : public runtime::Service {
   bool command_includes_gravity_ = false;
   wire::PlannerState planner_state_ = wire::PlannerState::idle;
   std::uint64_t epoch_ = 0;
-  std::optional<wire::Mode> mode_;  ///< stop or hold while one is in force
+  bus::WriterId owner_{};                     ///< of the planner that drives the arm
+  std::optional<std::uint64_t> driven_from_;  ///< the step at which it began to, after a hold
+  std::optional<wire::Mode> mode_;            ///< stop or hold while one is in force
   std::uint64_t mode_id_ = 0;
   wire::Validity validity_ = wire::Validity::holding;
 
-  std::uint64_t commands_missed_ = 0, deadlines_missed_ = 0, commands_refused_ = 0;
+  std::uint64_t commands_missed_ = 0, deadlines_missed_ = 0, commands_refused_ = 0, outages_ = 0;
   std::uint64_t clock_every_ = 1;
-  Time next_step_{}, last_publish_{}, waiting_since_{}, last_status_{}, last_sync_{};
+  Time next_step_{}, last_publish_{}, waiting_since_{}, last_sync_{}, last_poll_{}, young_until_{};
   bool started_ = false;
   Outcome outcome_ = Outcome::running;
   std::unique_ptr<runtime::Checkpoint> checkpoint_;

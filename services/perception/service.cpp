@@ -11,7 +11,10 @@ namespace hamel::perception {
 using namespace std::chrono_literals;
 
 namespace {
+constexpr auto kClockHeard = 200ms;
 constexpr std::uint64_t kNever = ~std::uint64_t{0};
+
+std::int64_t number(std::uint64_t k) { return static_cast<std::int64_t>(k); }
 }  // namespace
 
 Checked<std::unique_ptr<PerceptionService>> PerceptionService::make(bus::Node& node,
@@ -25,9 +28,8 @@ PerceptionService::PerceptionService(bus::Node& node, const scene::Scene& scene,
     : arm_(scene.arm),
       source_(std::move(source)),
       sets_out_(node),
-      status_out_(node),
       clock_in_(node),
-      bus_name_(bus::to_string(node.options().vendor)) {
+      presence_(node, wire::ServiceKind::perception, scene.arm) {
   set_.source = scene.arm;
   set_.incarnation = 1;
 }
@@ -54,10 +56,15 @@ bool PerceptionService::hear_clock(Time now) {
   wire::SimulationClock c;
   while (clock_in_.take(c)) {
     if (c.arm != arm_) continue;
+    // Two arms of one key: the one that is known stays, as long as it is heard.
+    const bus::WriterId from = clock_in_.from();
+    if (clock_ && from != clock_writer_ && now - clock_heard_ < kClockHeard) continue;
+    clock_writer_ = from;
     const bool again = clock_ && c.incarnation == clock_->incarnation && c.step == clock_->step && c.running;
     const bool anew = !clock_ || c.incarnation != clock_->incarnation || c.step < clock_->step;
     if (again) ++repeated_;
     if (again || anew) next_.reset();
+    if (anew && !paused_) behind_ = 0;
     clock_ = c;
     set_.incarnation = c.incarnation;  // sets of an earlier run of the arm are none of this one
     clock_heard_ = now;
@@ -83,14 +90,34 @@ bool PerceptionService::publish_until(double t_s) {
   if (!lockstep && number_at(t_s) > *next_ + 4) next_ = number_at(t_s);
   bool any = false;
   while (*next_ != kNever && static_cast<double>(*next_) * source_.period_s() <= t_s) {
-    if (to_wire(source_, *next_, lockstep, set_)) {
-      sets_out_.publish(set_);
-      ++published_;
-      any = true;
-    }
-    next_ = lockstep ? after(*next_) : *next_ + 1;
+    const bool promise = lockstep && !controlled_;
+    any |= publish_set(*next_, promise);
+    next_ = promise ? after(*next_) : *next_ + 1;
   }
   return any;
+}
+
+bool PerceptionService::publish_set(std::uint64_t k, bool promise) {
+  const bool stands = paused_ && steps_ == 0;
+  if (paused_ && steps_ > 0) --steps_, ++shown_;
+  if (!paused_) shown_ = std::max(number(k) - behind_, number(0));
+  behind_ = number(k) - shown_;
+  if (!to_wire(source_, k, static_cast<std::uint64_t>(shown_), promise, set_)) return false;
+  if (stands)
+    for (geometry::Obstacle& o : set_.obstacles) o.V_WO.setZero(), o.velocity_known = true;
+  ++published_;
+  return sets_out_.publish(set_);
+}
+
+void PerceptionService::pause(bool on) {
+  if (controlled_ && paused_ == on) return;
+  controlled_ = true;
+  paused_ = on;
+  steps_ = 0;
+}
+
+void PerceptionService::step() {
+  if (paused_) ++steps_;
 }
 
 /// The number of the set that follows number k where something changes; kNever when nothing will.
@@ -112,17 +139,12 @@ runtime::Clock::time_point PerceptionService::due() const {
 
 void PerceptionService::publish_status(Time now, wire::ServiceState state) {
   last_status_ = now;
-  wire::ServiceStatus s;
-  s.kind = wire::ServiceKind::perception;
-  s.arm = arm_;
-  s.incarnation = set_.incarnation;
-  s.version = runtime::version();
-  s.idl_hash = wire::idl_hash();
-  s.bus = bus_name_;
-  s.state = state;
-  s.detail = source_.is_static() ? "static obstacles" : "moving obstacles";
-  s.counters = {{"sets", published_}, {"repeated", repeated_}, {"undecodable", clock_in_.undecodable()}};
-  status_out_.publish(s);
+  presence_.say(
+      now, {.state = state,
+            .incarnation = set_.incarnation,
+            .detail = source_.is_static() ? "static obstacles" : "moving obstacles",
+            .counters = {
+                {"sets", published_}, {"repeated", repeated_}, {"undecodable", clock_in_.undecodable()}}});
 }
 
 void PerceptionService::close() { publish_status(runtime::Clock::now(), wire::ServiceState::stopping); }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/runtime/loop.h"
+#include "common/runtime/presence.h"
 #include "common/scene/scene.h"
 #include "common/wire/endpoint.h"
 #include "services/perception/core/source.h"
@@ -17,6 +18,8 @@ namespace hamel::perception {
 /// that the planner need not wait for them, and none where nothing changes; in real time each period, when
 /// its time has come.  Inside a gap of a stream nothing is published: the planner's last set grows old and it
 /// says so.
+///
+/// While it is paused the sets go on and the world in them stands: places as they were, velocities zero.
 class PerceptionService final : public runtime::Service {
  public:
   /// Fails with what scene::problems() says of the scene's perception.
@@ -27,6 +30,14 @@ class PerceptionService final : public runtime::Service {
   int readers() const override { return sets_out_.matched(); }
   void close() override;
 
+  /// The world stands, or goes on from where it stood.  Once called, sets promise no more than their period.
+  void pause(bool on);
+  /// Paused: the world moves on by one set.
+  void step();
+  bool paused() const { return paused_; }
+  /// The time in the source that the last set showed.
+  double shown_s() const { return static_cast<double>(shown_) * source_.period_s(); }
+
  private:
   using Time = runtime::Clock::time_point;
   PerceptionService(bus::Node& node, const scene::Scene& scene, Source source);
@@ -34,21 +45,26 @@ class PerceptionService final : public runtime::Service {
   bool hear_clock(Time now);
   double run_time_s(Time now) const;
   bool publish_until(double t_s);
+  bool publish_set(std::uint64_t k, bool promise);
   std::uint64_t after(std::uint64_t k) const;
   void publish_status(Time now, wire::ServiceState state);
 
   const std::uint32_t arm_;
   const Source source_;
   wire::Publisher<wire::ObstacleSet> sets_out_;
-  wire::Publisher<wire::ServiceStatus> status_out_;
   wire::Subscription<wire::SimulationClock> clock_in_;
-  std::string bus_name_;
+  runtime::Presence presence_;
 
   wire::ObstacleSet set_;
   std::optional<wire::SimulationClock> clock_;
+  bus::WriterId clock_writer_{};
   Time clock_heard_{}, last_status_{};
   std::optional<std::uint64_t> next_;  ///< number of the next set; none: not begun
   std::uint64_t published_ = 0, repeated_ = 0;
+  bool controlled_ = false, paused_ = false;
+  std::uint64_t steps_ = 0;  ///< asked for and not made yet
+  std::int64_t shown_ = 0;   ///< what the last set showed, as its number without pauses
+  std::int64_t behind_ = 0;  ///< sets by which pauses hold the world back; of a run begun anew, < 0: ahead
 };
 
 }  // namespace hamel::perception

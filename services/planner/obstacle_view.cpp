@@ -21,11 +21,21 @@ ObstacleView::ObstacleView(const scene::Scene& scene)
   if (cull_ || skip_links_) reach_.emplace(scene.robot, scene.planner);
 }
 
+void ObstacleView::begin(std::uint64_t incarnation) {
+  incarnation_ = incarnation;
+  changed_ = true;
+  std::erase_if(sources_, [&](const auto& s) {
+    return s.second.empty() || s.second.front().incarnation < incarnation;
+  });
+}
+
 void ObstacleView::add(const wire::ObstacleSet& set) {
+  if (set.incarnation < incarnation_) return;
   if (!sources_.contains(set.source) && sources_.size() >= kMaxSources) return;
   Queue& q = sources_[set.source];
   changed_ = true;
-  if (!q.empty() && set.incarnation != q.back().incarnation) q.clear();
+  if (!q.empty() && set.incarnation < q.back().incarnation) return;
+  if (!q.empty() && set.incarnation > q.back().incarnation) q.clear();
   const auto at = std::lower_bound(q.begin(), q.end(), set.t_s,
                                    [](const wire::ObstacleSet& s, double t_s) { return s.t_s < t_s; });
   if (at != q.end() && at->t_s == set.t_s) {
@@ -40,8 +50,9 @@ void ObstacleView::add(const wire::ObstacleSet& set) {
 
 bool ObstacleView::covers(double t_s) const {
   if (sources_.empty()) return false;
-  return std::all_of(sources_.begin(), sources_.end(), [t_s](const auto& source) {
-    return std::any_of(source.second.begin(), source.second.end(),
+  return std::all_of(sources_.begin(), sources_.end(), [t_s, this](const auto& source) {
+    return current(source.second) &&
+           std::any_of(source.second.begin(), source.second.end(),
                        [t_s](const wire::ObstacleSet& s) { return s.t_s <= t_s && t_s < s.next_t_s; });
   });
 }
@@ -54,7 +65,7 @@ double ObstacleView::at(double t_s, const Eigen::VectorXd& q, wire::Causes& caus
       queue.pop_front();
       changed_ = true;
     }
-    if (queue.empty()) continue;
+    if (!current(queue)) continue;
     any = true;
     const wire::ObstacleSet& s = queue.front();
     causes.add(wire::ServiceKind::perception, s.sequence_number);
@@ -71,7 +82,7 @@ void ObstacleView::put_together() {
   changed_ = false;
   all_.clear();
   for (const auto& [source, queue] : sources_)
-    if (!queue.empty())
+    if (current(queue))
       all_.insert(all_.end(), queue.front().obstacles.begin(), queue.front().obstacles.end());
   if (reach_) reach_->sift(all_, kHorizon_s, kept_, floor_m_);
 }

@@ -21,6 +21,9 @@ class ObstacleView {
   ObstacleView() = default;
   /// Leaves out what the scene's reductions `obstacles` and `links` allow; the planner's output is the same.
   explicit ObstacleView(const scene::Scene& scene);
+  /// Knows sets of this incarnation of the arm only, from now on: those of an earlier one are forgotten and
+  /// not taken any more, those of a later one wait for it.
+  void begin(std::uint64_t incarnation);
 
   /// Keeps a set until a newer one covers its time.  A set older than one already used, or one that is held
   /// already, is passed over; a raised incarnation starts its source afresh.
@@ -39,12 +42,12 @@ class ObstacleView {
   /// For each link a distance that no obstacle comes under; empty: nothing is known (Input::link_floor_m).
   std::span<const double> link_floor_m() const noexcept { return floor_shown_; }
 
-  bool empty() const { return sources_.empty(); }
-
  private:
   void put_together();
 
-  using Queue = std::deque<wire::ObstacleSet>;  // ordered by time
+  using Queue = std::deque<wire::ObstacleSet>;  // ordered by time, of one incarnation
+  bool current(const Queue& q) const { return !q.empty() && q.front().incarnation == incarnation_; }
+  std::uint64_t incarnation_ = 0;
   std::map<std::uint32_t, Queue> sources_;
   std::optional<scene::Reach> reach_;
   bool cull_ = false, skip_links_ = false;

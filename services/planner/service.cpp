@@ -12,9 +12,11 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::uint32_t kCheckpointKind = 0x0201;  // planner, layout 1
-constexpr double kMemoryFresh_s = 0.2;             // realtime: older memory is ramped in again
-constexpr auto kReportPeriod = 10ms;  // realtime: a report each, and one at every change of state
+constexpr std::uint32_t kCheckpointKind = 0x0202;  // planner, layout 2
+constexpr auto kArmHeard = 200ms;  // an arm speaks at least each 100 ms: so long no other is heard
+constexpr std::uint32_t kArmBits = 0x0fffffff;  // of an obstacle source: the arm it sees for
+constexpr double kMemoryFresh_s = 0.2;          // realtime: older memory is ramped in again
+constexpr auto kReportPeriod = 10ms;            // realtime: a report each, and one at every change of state
 
 struct SavedGoal {
   std::uint64_t id = 0, kind = 0, joints = 0;
@@ -29,17 +31,11 @@ Result<std::unique_ptr<PlannerService>, Problem> PlannerService::make(bus::Node&
                                                                       const ServiceConfig& config) {
   std::unique_ptr<PlannerService> s(new PlannerService(node, scene, config));
   if (config.state_dir.empty()) return s;
-  const std::string path = config.state_dir + "/planner-" + std::to_string(scene.arm) + ".checkpoint";
-  auto c = runtime::Checkpoint::open(path, kCheckpointKind, sizeof(Memory) + 4096);
+  auto c = runtime::Checkpoint::resume(config.state_dir, "planner", scene.arm, kCheckpointKind,
+                                       sizeof(Memory) + 8192,
+                                       [&](std::span<const std::byte> bytes) { return s->load(bytes); });
   if (!c) return c.error();
   s->checkpoint_ = std::move(c).value();
-  std::string note;
-  const auto bytes = s->checkpoint_->load(note);
-  if (!note.empty()) spdlog::warn("{}: {}", path, note);
-  if (!bytes.empty() && s->load(bytes))
-    spdlog::info("resumed at step {} with goal {}", *s->memory_step_, s->goal_ ? s->goal_->id : 0);
-  else if (!bytes.empty())
-    spdlog::warn("{}: of another scene or version, refused; starting afresh", path);
   return s;
 }
 
@@ -52,13 +48,13 @@ PlannerService::PlannerService(bus::Node& node, const scene::Scene& scene, const
       goal_(scene.goal),
       command_out_(node),
       report_out_(node),
-      status_out_(node),
       state_in_(node),
       obstacles_in_(node),
       goal_in_(node),
       mode_in_(node),
-      bus_name_(bus::to_string(node.options().vendor)),
+      presence_(node, wire::ServiceKind::planner, scene.arm),
       view_(scene_) {
+  epoch_ += std::uint64_t{config.strength} << 32;
   if (goal_) planner_.set_goal(*goal_);
   report_.method = scene::to_string(scene.planner.method);
   q_.resize(scene.robot.chain.n());
@@ -72,7 +68,7 @@ bool PlannerService::poll(Time now) {
   const bool heard = take_states(now);
   const bool planned = answer(now);
   if (!planned) report_silence(now);
-  if (now - last_status_ >= 500ms) publish_status(now, wire::ServiceState::ready);
+  if (presence_.due(now)) publish_status(now, wire::ServiceState::ready);
   if (checkpoint_ && now - last_sync_ >= 1s) {
     last_sync_ = now;
     checkpoint_->sync();
@@ -112,7 +108,8 @@ void PlannerService::take_modes() {
 }
 
 void PlannerService::take_obstacles() {
-  while (obstacles_in_.take(set_)) view_.add(set_);
+  while (obstacles_in_.take(set_))
+    if ((set_.source & kArmBits) == scene_.arm) view_.add(set_);
 }
 
 bool PlannerService::take_states(Time now) {
@@ -125,12 +122,14 @@ bool PlannerService::take_states(Time now) {
         spdlog::warn("state with {} joints refused: arm {} has {}", s.position.size(), scene_.arm, q_.size());
       continue;
     }
-    // Two arms of one key: the one that began last is the arm, as long as it is heard.
-    if (incarnation_ && s.incarnation < *incarnation_ && now - last_state_ < 1s) {
+    // Two arms of one key: the one that is known stays, as long as it is heard.
+    const bus::WriterId from = state_in_.from();
+    if (have_state_ && from != arm_writer_ && now - last_state_ < kArmHeard) {
       if (refusals_(now))
         spdlog::warn("another arm {} speaks on this domain (an earlier run?); not heard", s.arm);
       continue;
     }
+    arm_writer_ = from;
     heard = true;
     last_state_ = now;
     if (incarnation_ != s.incarnation) meet(s);
@@ -151,6 +150,7 @@ void PlannerService::meet(const wire::ArmState& s) {
   const bool known = incarnation_.has_value();
   incarnation_ = s.incarnation;
   if (known) spdlog::info("arm {} began anew (incarnation {})", s.arm, s.incarnation);
+  view_.begin(s.incarnation);
   memory_step_.reset();
   planner_ = Planner(scene_.robot, scene_.planner);
   if (goal_) planner_.set_goal(*goal_);
@@ -159,17 +159,21 @@ void PlannerService::meet(const wire::ArmState& s) {
 bool PlannerService::answer(Time now) {
   if (!have_state_ || answered_) return false;
   const bool lockstep = config_.pace == scene::Pace::lockstep;
-  if (lockstep && command_.step == state_.step && memory_step_ == state_.step) {
-    publish_command();
+  const bool known = command_.step == state_.step && command_.state_incarnation == state_.incarnation;
+  if (lockstep && known && memory_step_ == state_.step) {
+    command_out_.publish(command_);
     answered_ = true;
     return true;
   }
   if (lockstep && !view_.covers(state_.t_s)) return false;
   plan(now);
   answered_ = true;
-  publish_command();
+  fill_command();
+  // Saved before it is said: whoever is killed in between says it again, not something else.
+  if (lockstep) save();
+  command_out_.publish(command_);
   publish_report(now, lockstep);
-  save();
+  if (!lockstep) save();
   return true;
 }
 
@@ -204,7 +208,7 @@ void PlannerService::plan(Time now) {
   cycle_s_ = std::chrono::duration<double>(runtime::Clock::now() - began).count();
 }
 
-void PlannerService::publish_command() {
+void PlannerService::fill_command() {
   command_.arm = scene_.arm;
   command_.epoch = epoch_;
   command_.state_incarnation = state_.incarnation;
@@ -213,7 +217,6 @@ void PlannerService::publish_command() {
   command_.torque = output_.torque_Nm;
   command_.includes_gravity = false;
   command_.planner_state = mode_ ? wire::PlannerState::idle : to_wire(output_.report.state);
-  command_out_.publish(command_);
 }
 
 void PlannerService::publish_report(Time now, bool always) {
@@ -269,21 +272,13 @@ void PlannerService::report_silence(Time now) {
 }
 
 void PlannerService::publish_status(Time now, wire::ServiceState state) {
-  last_status_ = now;
-  wire::ServiceStatus s;
-  s.kind = wire::ServiceKind::planner;
-  s.arm = scene_.arm;
-  s.incarnation = epoch_;
-  s.version = runtime::version();
-  s.idl_hash = wire::idl_hash();
-  s.bus = bus_name_;
-  s.state = state;
-  s.detail = wire::to_string(shown_);
-  s.counters = {{"cycles", cycles_},
-                {"commands_late", commands_late_},
-                {"undecodable", state_in_.undecodable() + obstacles_in_.undecodable() +
-                                    goal_in_.undecodable() + mode_in_.undecodable()}};
-  status_out_.publish(s);
+  presence_.say(now, {.state = state,
+                      .incarnation = epoch_,
+                      .detail = wire::to_string(shown_),
+                      .counters = {{"cycles", cycles_},
+                                   {"commands_late", commands_late_},
+                                   {"undecodable", state_in_.undecodable() + obstacles_in_.undecodable() +
+                                                       goal_in_.undecodable() + mode_in_.undecodable()}}});
 }
 
 void PlannerService::close() { publish_status(runtime::Clock::now(), wire::ServiceState::stopping); }
@@ -308,6 +303,10 @@ void PlannerService::save() {
   p.put(g);
   p.put(goal_ ? goal_->joints.data() : nullptr, goal_ ? static_cast<std::size_t>(goal_->joints.size()) : 0);
   p.put(planner_.memory());
+  p.put(command_.step);
+  p.put(static_cast<std::uint32_t>(command_.planner_state));
+  p.put(command_.torque.data(), static_cast<std::size_t>(command_.torque.size()));
+  p.put(command_.caused_by);
   checkpoint_->save(packed_);
 }
 
@@ -317,13 +316,24 @@ bool PlannerService::load(std::span<const std::byte> bytes) {
   std::int64_t mode = -1;
   SavedGoal g;
   Eigen::VectorXd joints;
+  wire::TorqueCommand last;
+  std::uint32_t last_state = 0;
   auto memory = std::make_unique<Memory>();
   const bool whole = u.get(print) && u.get(epoch) && u.get(incarnation) && u.get(step) && u.get(mode) &&
-                     u.get(mode_id) && u.get(g) && u.get_doubles(joints) && u.get(*memory) && u.at_end();
-  if (!whole || print != fingerprint_) return false;
-  epoch_ = epoch + 1;
+                     u.get(mode_id) && u.get(g) && u.get_doubles(joints) && u.get(*memory) &&
+                     u.get(last.step) && u.get(last_state) && u.get_doubles(last.torque) &&
+                     u.get(last.caused_by) && u.at_end();
+  if (!whole || print != fingerprint_ || last.torque.size() != q_.size()) return false;
+  epoch_ = (std::uint64_t{config_.strength} << 32) + (epoch & 0xffffffff) + 1;
   incarnation_ = incarnation;
+  view_.begin(incarnation);
   memory_step_ = step;
+  command_ = last;
+  command_.arm = scene_.arm;
+  command_.epoch = epoch_;
+  command_.state_incarnation = incarnation;
+  command_.t_s = static_cast<double>(last.step) * scene_.dynamics.dt_s;
+  command_.planner_state = static_cast<wire::PlannerState>(last_state);
   if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
   mode_id_ = mode_id;
   if (g.id > 0) {
@@ -338,6 +348,7 @@ bool PlannerService::load(std::span<const std::byte> bytes) {
     planner_.set_goal(goal);
   }
   planner_.restore(*memory);
+  spdlog::info("resumed at step {} with goal {}", step, goal_ ? goal_->id : 0);
   return true;
 }
 

@@ -9,6 +9,7 @@
 #include "common/runtime/checkpoint.h"
 #include "common/runtime/log.h"
 #include "common/runtime/loop.h"
+#include "common/runtime/presence.h"
 #include "common/wire/endpoint.h"
 #include "services/planner/core/planner.h"
 #include "services/planner/obstacle_view.h"
@@ -18,6 +19,7 @@ namespace hamel::planner {
 struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
   std::string state_dir = {};  ///< checkpoint folder; empty: none
+  std::uint32_t strength = 0;  ///< of several planners for one arm the strongest that is heard drives it
 };
 
 class PlannerService final : public runtime::Service {
@@ -42,7 +44,7 @@ class PlannerService final : public runtime::Service {
   void meet(const wire::ArmState& s);
   bool answer(Time now);
   void plan(Time now);
-  void publish_command();
+  void fill_command();
   void publish_report(Time now, bool always);
   void report_silence(Time now);
   void publish_status(Time now, wire::ServiceState state);
@@ -54,17 +56,16 @@ class PlannerService final : public runtime::Service {
   const std::uint64_t fingerprint_;
   Planner planner_;
   Output output_;
-  std::uint64_t epoch_ = 1;
+  std::uint64_t epoch_ = 1;  ///< strength * 2^32 + starts
   std::optional<scene::Goal> goal_;
 
   wire::Publisher<wire::TorqueCommand> command_out_;
   wire::Publisher<wire::PlannerReport> report_out_;
-  wire::Publisher<wire::ServiceStatus> status_out_;
   wire::Subscription<wire::ArmState> state_in_;
   wire::Subscription<wire::ObstacleSet> obstacles_in_;
   wire::Subscription<wire::Goal> goal_in_;
   wire::Subscription<wire::ModeCommand> mode_in_;
-  std::string bus_name_;
+  runtime::Presence presence_;
 
   wire::ArmState state_;
   wire::ObstacleSet set_;
@@ -76,13 +77,14 @@ class PlannerService final : public runtime::Service {
 
   bool have_state_ = false, answered_ = true;  ///< answered: the newest state has its command
   std::optional<std::uint64_t> incarnation_;   ///< of the arm we know
+  bus::WriterId arm_writer_{};                 ///< who speaks for it
   std::optional<std::uint64_t> memory_step_;   ///< the step our memory stands at
   std::optional<wire::Mode> mode_;
   std::uint64_t mode_id_ = 0, commands_late_ = 0, cycles_ = 0;
   wire::PlannerState shown_ = wire::PlannerState::idle;
   wire::Reason shown_reason_ = wire::Reason::none;
   double cycle_s_ = 0;
-  Time last_state_{}, last_report_{}, last_silence_{}, last_status_{}, last_sync_{};
+  Time last_state_{}, last_report_{}, last_silence_{}, last_sync_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
   runtime::RateLimit refusals_;

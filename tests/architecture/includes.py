@@ -23,12 +23,12 @@ SHELL = {
     "idl": set(),
     "common/bus": {"common/base", "idl"},
     "common/wire": {"common/base", "common/lie", "common/geometry", "common/bus", "idl"},
-    "common/files": BELOW_CORES | {"services/perception/core"},
+    "common/record": {"common/base"},
+    "common/files": BELOW_CORES | {"services/perception/core", "common/wire", "common/record"},
     "common/runtime": BELOW_CORES | {"idl", "common/bus", "common/wire", "common/files"},
 }
 for service in ("dynamics", "planner", "perception"):
     SHELL[f"services/{service}"] = BELOW_CORES | set(SHELL) | {"common/runtime", f"services/{service}/core"}
-SHELL["common/record"] = {"common/base"}
 SHELL["clients/hamel"] = set(CORE) | set(SHELL)
 ROOMS = CORE | SHELL
 

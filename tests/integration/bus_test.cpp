@@ -155,6 +155,26 @@ TEST_P(Bus, SlowReaderFindsTheLastLatchedSample) {
   }));
 }
 
+TEST_P(Bus, AReaderMayAskForMoreOfALatchedTopicThanTheLast) {
+  const auto a = from(13), b = to(13);
+  const auto writer = a->writer(topics::kObstacles);
+  const auto reader = b->reader(topics::kObstacles, 64);
+  const auto witness =
+      b->reader(topics::kObstacles);  // of the usual depth: when it has the last, all are there
+  ASSERT_TRUE(wait_for(*b, [&] { return writer->matched() == 2 && reader->matched() == 1; }));
+  for (std::uint32_t i = 0; i < 50; ++i) ASSERT_TRUE(writer->write(sample(7, i)));
+  Payload p = sample(7, 0);
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (number_in(p) != 49 && witness->take(p)) {
+    }
+    return number_in(p) == 49;
+  }));
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    ASSERT_TRUE(wait_for(*b, [&] { return reader->take(p); }));
+    ASSERT_EQ(number_in(p), i);
+  }
+}
+
 TEST_P(Bus, StoppedReaderDoesNotBlockTheWriter) {
   const auto a = from(4), b = to(4);
   const auto writer = a->writer(topics::kState);
@@ -247,6 +267,83 @@ TEST_P(Bus, EveryMessageArrivesAsItWasSent) {
   there_and_equal(wire::RunSummary());
 }
 
+/// What a reader knows of its writers: who wrote, who took back, who lives.
+TEST_P(Bus, TellsWhoWrote) {
+  const auto a = from(13), b = to(13);
+  const auto first = a->writer(topics::kGoal), second = a->writer(topics::kGoal);
+  const auto reader = b->reader(topics::kGoal);
+  EXPECT_NE(first->id(), second->id());
+  ASSERT_TRUE(first->write(sample(1, 1)));
+  ASSERT_TRUE(second->write(sample(2, 2)));
+  std::map<std::uint32_t, bus::WriterId> by;
+  Payload p;
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (reader->take(p)) by[key_in(p)] = reader->from();
+    return by.size() == 2;
+  }));
+  EXPECT_EQ(by[1], first->id());
+  EXPECT_EQ(by[2], second->id());
+}
+
+TEST_P(Bus, AKeyThatIsDisposedIsGoneForLateReaders) {
+  const auto a = from(14), b = to(14);
+  const auto writer = a->writer(topics::kGoal);
+  const auto early = b->reader(topics::kGoal);
+  for (const std::uint32_t key : {1U, 0x12345678U}) ASSERT_TRUE(writer->write(sample(key, key)));
+  Payload p;
+  int taken = 0;
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (early->take(p)) ++taken;
+    return taken == 2;
+  }));
+  ASSERT_TRUE(writer->dispose(sample(0x12345678, 0)));
+  ASSERT_TRUE(wait_for(*b, [&] { return !early->take(p) && early->counters().disposed == 1; }));
+  const auto late = b->reader(topics::kGoal);
+  ASSERT_TRUE(wait_for(*b, [&] { return late->take(p); }));
+  EXPECT_EQ(key_in(p), 1U);
+  // A word said after the dispose comes behind whatever the late reader was given of the past.
+  ASSERT_TRUE(writer->write(sample(5, 5)));
+  ASSERT_TRUE(wait_for(*b, [&] { return late->take(p); }));
+  EXPECT_EQ(key_in(p), 5U);
+}
+
+TEST_P(Bus, BrokenPromisesAreCounted) {
+  if (GetParam().from == Vendor::inproc) return;  // a writer within the process needs no watching
+  const auto a = from(15), b = to(15);
+  const auto reader = b->reader(topics::kCommand, 0, bus::Ask::promises), lenient = b->reader(topics::kCommand);
+  auto node = open(GetParam().from, GetParam().domain + 15);
+  const auto writer = node->writer(topics::kCommand);
+  Payload p;
+  ASSERT_TRUE(wait_for(*b, [&] {
+    writer->write(sample(1, 1));
+    return reader->take(p) && lenient->take(p);
+  }));
+  EXPECT_TRUE(wait_for(*b, [&] { return reader->counters().late > 0; })) << "deadline: nothing for 50 ms";
+  EXPECT_EQ(lenient->counters().late, 0U) << "did not ask";
+}
+
+TEST_P(Bus, ListsTheEndsOfOthers) {
+  const auto a = from(16), b = to(16);
+  const auto writer = a->writer(topics::kGoal);
+  const auto reader = a->reader(topics::kState);
+  std::vector<bus::Endpoint> ends;
+  ASSERT_TRUE(wait_for(*b, [&] {
+    ends = b->endpoints();
+    return ends.size() >= 2;
+  }));
+  ASSERT_EQ(ends.size(), 2U);
+  for (const bus::Endpoint& e : ends) {
+    EXPECT_EQ(e.topic, e.writes ? "hamel/v1/goal" : "hamel/v1/state");
+    EXPECT_EQ(e.type, e.writes ? "hamel::v1::Goal" : "hamel::v1::ArmState");
+    EXPECT_TRUE(e.reliable);
+    EXPECT_EQ(e.latched, e.writes);
+    if (e.writes) {
+      EXPECT_EQ(e.id, writer->id());
+      EXPECT_EQ(e.participant, "hamel");
+    }
+  }
+}
+
 /// Ends come and go while samples fly: nothing may be called on what is gone.
 TEST_P(Bus, ReadersMayLeaveWhileSamplesArrive) {
   const auto a = from(10), b = to(10);
@@ -291,14 +388,20 @@ TEST_P(Bus, DisagreementAboutQosIsCountedAndSaidOnce) {
   const auto a = from(12, log), b = to(12, log);
   const auto writer = a->writer(stream);
   const auto reader = b->reader(topics::kGoal);
-  ASSERT_TRUE(wait_for(
-      *b, [&] { return writer->counters().incompatible > 0 && reader->counters().incompatible > 0; }));
+  ASSERT_TRUE(wait_for(*b, [&] {
+    a->wait(std::chrono::steady_clock::now());
+    std::lock_guard lock(mutex);
+    return writer->counters().incompatible > 0 && reader->counters().incompatible > 0 && said.size() == 2;
+  }));
   EXPECT_EQ(writer->matched(), 0);
   std::lock_guard lock(mutex);
   ASSERT_EQ(said.size(), 2U);
   for (const std::string& line : said) {
     EXPECT_NE(line.find("hamel/v1/goal"), std::string::npos) << line;
     EXPECT_NE(line.find("durability"), std::string::npos) << line;
+    EXPECT_NE(line.find("volatile"), std::string::npos) << line;
+    EXPECT_NE(line.find("transient-local"), std::string::npos) << "both sides: " << line;
+    EXPECT_NE(line.find("of hamel"), std::string::npos) << "whose: " << line;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/lie/so3.h"
 #include "services/perception/core/source.h"
 
 namespace hamel::perception {
@@ -20,9 +21,19 @@ scene::ScriptedObstacle sphere(std::uint32_t id, const Eigen::Vector3d& p) {
   return o;
 }
 
-scene::PerceptionOptions with_stream(std::vector<scene::StreamSample> samples) {
+/// A sphere of a stream at one time.
+struct Row {
+  double t_s;
+  std::uint32_t id;
+  Eigen::Vector3d p_m;
+  double radius_m;
+};
+
+scene::PerceptionOptions with_stream(const std::vector<Row>& rows) {
   scene::PerceptionOptions o;
-  o.stream.emplace().samples = std::move(samples);
+  o.stream.emplace();
+  for (const Row& r : rows)
+    o.stream->samples.push_back({r.t_s, r.id, r.p_m, {geometry::ShapeKind::sphere, {r.radius_m, 0, 0}}});
   return o;
 }
 
@@ -210,7 +221,7 @@ TEST(Source, SameTimeSameBitsInAnyOrder) {
 }
 
 TEST(Source, AGlitchOfThirtyMetresASecondGivesNoVelocity) {
-  std::vector<scene::StreamSample> samples;
+  std::vector<Row> samples;
   for (int i = 0; i < 10; ++i) samples.push_back({i * 0.1, 1, {0.1 * i, 0, 0}, 0.1});  // 1 m/s along x
   samples[5].p_m.y() = 3;                                                              // and back: 30 m/s
   const Source s = make(with_stream(samples));
@@ -223,6 +234,44 @@ TEST(Source, AGlitchOfThirtyMetresASecondGivesNoVelocity) {
   auto all = with_stream(samples);
   all.stream->glitch_mps = 100;
   EXPECT_GT(at(make(all), 0.45)[0].V_WO.norm(), 29) << "the guard can be turned off";
+}
+
+TEST(Source, ASolidOfAStreamTurnsAndGrowsOnItsLine) {
+  auto o = with_stream({});
+  const auto box = [](double t_s, double angle, double edge) {
+    scene::StreamSample s{t_s, 4, {t_s, 0, 0}, {geometry::ShapeKind::box, {edge, 1, 1}}};
+    s.R_SO = lie::exp_so3(Eigen::Vector3d(0, 0, angle));
+    return s;
+  };
+  o.stream->samples = {box(0, 0.3, 1), box(0.4, 0.7, 2), box(0.8, 1.1, 2)};
+  o.stream->scale = 2;
+  o.stream->rate = 0.5;
+  o.stream->X_WS.R = lie::exp_so3(Eigen::Vector3d(0.5, 0, 0));
+  const Obstacle x = at(make(o), 0.4).at(0);  // 0.2 s of the stream
+  EXPECT_EQ(x.shape.kind, geometry::ShapeKind::box);
+  EXPECT_LT((x.shape.dims_m - Eigen::Vector3d(3, 2, 2)).norm(), 1e-14);
+  EXPECT_LT((x.X_WO.R - o.stream->X_WS.R * lie::exp_so3(Eigen::Vector3d(0, 0, 0.5))).norm(), 1e-14);
+  EXPECT_LT((x.V_WO.head<3>() - o.stream->X_WS.R * Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-14);
+  EXPECT_LT((x.V_WO.tail<3>() - Eigen::Vector3d(1, 0, 0)).norm(), 1e-14);
+}
+
+TEST(Source, NothingThereIsAnEmptySetNotAGap) {
+  auto o = with_stream({{0, 1, {0, 0, 0}, 1}, {0.1, 1, {1, 0, 0}, 1}, {2, 1, {2, 0, 0}, 1}});
+  o.stream->empty_s = {0.2, 1.0, 1.9};
+  const Source s = make(o);
+  EXPECT_EQ(at(s, 0.19).size(), 1u);
+  for (const double t : {0.2, 0.5, 1.0, 1.5, 1.95}) EXPECT_TRUE(at(s, t).empty()) << t;
+  EXPECT_EQ(at(s, 2.0).size(), 1u);
+}
+
+TEST(Source, UntilIsTheLastSampleThatCounts) {
+  auto o = with_stream({{0, 1, {0, 0, 0}, 1}, {0.1, 1, {1, 0, 0}, 1}, {0.2, 1, {2, 0, 0}, 1}});
+  o.stream->until_s = 0.1;
+  const Source s = make(o);
+  EXPECT_EQ(at(s, 0.15).size(), 1u);
+  EXPECT_TRUE(at(s, 0.21).empty());
+  o.stream->until_s = -1;
+  EXPECT_FALSE(Source::make(o)) << "nothing is left";
 }
 
 scene::PerceptionOptions flawed(const scene::Flaws& f) {

@@ -77,7 +77,6 @@ const std::array<std::array<double, 12>, 12> Dop853::a = {{
 
 namespace {
 constexpr double kSafety = 0.9, kShrink = 1. / 3, kGrow = 6;
-constexpr int kMaxSteps = 5000;  // of one output interval, which is halved when they do not suffice
 }  // namespace
 
 template <class G>
@@ -153,9 +152,13 @@ StepReport Dopri8Step<G>::advance(const Node<G>& from, const Load<G>& load, doub
     const double left = h - done, step = next > 0.99 * left ? left : std::min(next, 0.5 * left);
     const double error = try_step(step, load);
     report.evaluations += Dop853::kStages - 1;
-    if (!std::isfinite(error) || ++report.iterations > kMaxSteps || step < 1e-13 * h) return report;
-    const double factor = kSafety * std::pow(std::max(error, 1e-30), -1. / 8);
-    if (error > 1) {
+    if (++report.iterations > kMaxSteps) {
+      report.stop = Stop::budget_spent;
+      return report;
+    }
+    if (step < 1e-13 * h) return report;
+    const double factor = std::isfinite(error) ? kSafety * std::pow(std::max(error, 1e-30), -1. / 8) : 0;
+    if (!(error <= 1)) {
       next = step * std::max(kShrink, factor);
       continue;
     }

@@ -4,7 +4,7 @@
 ///
 /// dt_s is the time between outputs; inside it the method chooses its own steps by tolerance_rel, which
 /// counts against max(|q|, 1 rad) and max(|qd|, 1 rad/s).  StepReport::iterations counts those steps, refused
-/// ones included.
+/// ones included; after kMaxSteps of them an output interval is given up (budget_spent).
 
 #include <array>
 
@@ -19,12 +19,16 @@ struct Dop853 {
   static const std::array<std::array<double, kStages>, kStages> a;
 };
 
+/// The method's own steps in one output interval, at most.
+inline constexpr int kMaxSteps = 5000;
+
 template <class G>
 class Dopri8Step final : public TierStep<G> {
  public:
   Dopri8Step(const typename G::Chain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return 1; }  ///< the step it would take next [s]
   bool integrates_velocity() const noexcept override { return true; }
+  int budget() const noexcept override { return kMaxSteps; }
   StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
  private:

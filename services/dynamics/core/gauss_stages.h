@@ -45,10 +45,11 @@ template <class G, class P>
   }
 }
 
-/// Torque of the smooth hard stops.
+/// Torque of the smooth hard stops, as tier.h's.
 template <class P>
 [[gnu::always_inline]] inline P stop_torque(const rbd::JointNumbers& k, double stiffness, const P& q) {
-  return stiffness * (larger(k.lower - q, P{}) - larger(q - k.upper, P{}));
+  const auto push = [&](const P& e) { return stiffness * (e * e * (1.0 / (e + P::of(kStopWidth)))); };
+  return push(larger(k.lower - q, P{})) - push(larger(q - k.upper, P{}));
 }
 
 /// V = M(Q)^-1 P and F = dL/dq + joint torques for the stages from `first`, and their distance from job's V,

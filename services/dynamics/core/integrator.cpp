@@ -1,6 +1,8 @@
 #include "services/dynamics/core/integrator.h"
 
+#include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -68,6 +70,7 @@ class Integrator::Impl {
   virtual void between(const State& before, const State& after, double share, VectorXd& q,
                        VectorXd& qd) noexcept = 0;
   virtual Space space() const noexcept = 0;
+  virtual const VectorXd& torque_applied() const noexcept = 0;
 
   const model::Chain bare;  ///< without payload
   model::Chain chain;
@@ -86,8 +89,11 @@ class Arm final : public Integrator::Impl {
   State start(const VectorXd& q0, const VectorXd& qd0) const override { return marcher_.start(q0, qd0); }
   StepReport step(State& state, const VectorXd& tau) noexcept override {
     if (!marcher_.acceptable(state) || tau.size() != axis_.n() || !tau.allFinite()) return {};
-    load_.tau = tau;
-    return marcher_.step(state, load_);
+    const int saturated = cut(tau);
+    StepReport report = marcher_.step(state, load_);
+    report.saturated = saturated;
+    if (report.usable()) report.beyond_limits = outside(state);
+    return report;
   }
   double energy(const State& state) noexcept override { return marcher_.energy(state); }
   void set_wrench(int link, const lie::Wrench& F_W) noexcept override {
@@ -107,8 +113,28 @@ class Arm final : public Integrator::Impl {
     marcher_.between(before, after, share, q, qd);
   }
   Space space() const noexcept override { return std::is_same_v<G, SE2> ? Space::automatic : Space::se3; }
+  const VectorXd& torque_applied() const noexcept override { return load_.tau; }
 
  private:
+  /// Takes tau as far as the joints give it; how many give less.
+  int cut(const VectorXd& tau) noexcept {
+    int count = 0;
+    for (int i = 0; i < axis_.n(); ++i) {
+      const double effort = chain.joint(i).limits.effort;
+      load_.tau[i] = std::clamp(tau[i], -effort, effort);
+      count += load_.tau[i] != tau[i];
+    }
+    return count;
+  }
+  int outside(const State& s) const noexcept {
+    int count = 0;
+    for (int i = 0; i < axis_.n(); ++i) {
+      const model::JointLimits& limits = chain.joint(i).limits;
+      count += s.q[i] < limits.lower || s.q[i] > limits.upper || std::abs(s.qd[i]) > limits.velocity;
+    }
+    return count;
+  }
+
   typename G::Chain axis_;
   Load<G> load_;
   Marcher<G> marcher_;
@@ -131,6 +157,8 @@ State Integrator::start(const VectorXd& q0, const VectorXd& qd0) const {
   return impl_->start(q0, qd0);
 }
 StepReport Integrator::step(State& state, const VectorXd& tau) noexcept { return impl_->step(state, tau); }
+
+const VectorXd& Integrator::torque_applied() const noexcept { return impl_->torque_applied(); }
 
 void Integrator::set_wrench(int link, const lie::Wrench& F_W) noexcept {
   assert(link >= 0 && link < chain().n() && F_W.allFinite());

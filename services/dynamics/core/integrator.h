@@ -28,6 +28,10 @@ struct [[nodiscard]] StepReport {
   double residual_Nm = 0;     ///< largest torque left unbalanced
   double work_J = 0;          ///< of joint torques, damping and stops over the step, as applied
   double energy_error_J = 0;  ///< change of E(q, p) beyond that work: what the method made up
+  double made_up_J = 0;       ///< the sum of energy_error_J over all steps since start()
+  int saturated = 0;          ///< joints whose torque was cut at their effort limit
+  int beyond_limits =
+      0;  ///< joints that end outside their position limits or faster than their velocity limit
   bool usable() const noexcept { return stop != Stop::diverged && stop != Stop::budget_spent; }
 };
 
@@ -58,9 +62,12 @@ class Integrator {
 
   /// The state at rest history from q0, qd0: p = M(q0) qd0.
   State start(const Eigen::VectorXd& q0, const Eigen::VectorXd& qd0) const;
-  /// Advances by dt_s under joint torques `tau` (constant over the step).  O(n) an evaluation.  No
-  /// allocation, no throw, no lock.  On failure the state is untouched and the report says why.
+  /// Advances by dt_s under joint torques `tau` (constant over the step), cut at the joints' effort limits.
+  /// O(n) an evaluation.  No allocation, no throw, no lock.  On failure the state is untouched and the report
+  /// says why.
   StepReport step(State& state, const Eigen::VectorXd& tau) noexcept;
+  /// The torques of the last step as they acted; zero before the first.
+  const Eigen::VectorXd& torque_applied() const noexcept;
   /// From now on a wrench acts on link `link` at its frame's origin: torque [N m] and force [N] in world
   /// axes, constant until set anew.  It enters like joint torque (a tier keeps its order with it) and its
   /// work is in the report.  Not part of State: who resumes sets it again.

@@ -90,6 +90,7 @@ bool Marcher<G>::sane(const StepReport& report, const Load<G>& load, double h) c
   }
   const double in_play = now_.energy_J - now_.potential_J + work + chain_.energy_scale + kNothing;
   const double made_up = next_.energy_J - now_.energy_J - report.work_J;
+  if (!std::isfinite(in_play) || !std::isfinite(made_up)) return false;
   return std::abs(made_up) <= kEnergyBound * in_play && (!tier_->keeps_energy() || allowed(made_up, in_play));
 }
 
@@ -123,9 +124,10 @@ StepReport Marcher<G>::march(const Load<G>& load) noexcept {
     const StepReport r = advance(load, h);
     total.iterations += r.iterations;
     total.evaluations += r.evaluations;
+    const bool exhausted = total.iterations > tier_->budget();
     if (!r.usable()) {
       total.stop = r.stop;
-      if (part == 1) {
+      if (part == 1 || exhausted) {
         total.residual_Nm = r.residual_Nm;
         return total;
       }
@@ -138,11 +140,16 @@ StepReport Marcher<G>::march(const Load<G>& load) noexcept {
     total.energy_error_J += made_up;
     ledger_.made_up += made_up;
     ledger_.exchanged += std::abs(r.work_J);
+    total.made_up_J = ledger_.made_up;
     // stagnation in one part is told of the whole
     total.stop = total.substeps > 0 && total.stop == Stop::stagnated ? Stop::stagnated : r.stop;
     ++total.substeps;
     std::swap(now_, next_);
     done += part;
+    if (exhausted && done < whole) {
+      total.stop = Stop::budget_spent;
+      break;
+    }
   }
   return total;
 }

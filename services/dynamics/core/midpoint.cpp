@@ -69,14 +69,14 @@ template <class G>
   return f;
 }
 
-/// The Jacobian is M/h plus, on the diagonal, damping/2 and h stiffness/4 of stops that act.
+/// The Jacobian is M/h plus, on the diagonal, damping/2 and h/4 times the stops' slope.
 template <class G>
 void MidpointStep<G>::choose_factorisation(const VectorXd& d) noexcept {
   frames_ = &from_->X, factor_ = &from_->factor;
   bool large = false;
   for (int i = 0; i < chain_.n(); ++i) {
-    const bool stopped = stop_torque(chain_[i], options_.stop_stiffness, from_->q[i] + 0.5 * d[i]) != 0;
-    extra_[i] = 0.5 * h_ * chain_[i].damping + (stopped ? 0.25 * h_ * h_ * options_.stop_stiffness : 0);
+    const double slope = stop_slope(chain_[i], options_.stop_stiffness, from_->q[i] + 0.5 * d[i]);
+    extra_[i] = 0.5 * h_ * chain_[i].damping + 0.25 * h_ * h_ * slope;
     large = large || extra_[i] * from_->factor[at(i)].D_inv > kExtraShare;
   }
   if (!large) return;

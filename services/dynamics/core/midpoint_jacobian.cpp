@@ -10,8 +10,8 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 template <class G>
 double MidpointStep<G>::diagonal(int i, double d) const noexcept {
   const auto& k = chain_[i];
-  const bool stopped = stop_torque(k, options_.stop_stiffness, from_->q[i] + 0.5 * d) != 0;
-  return k.armature / h_ + 0.5 * k.damping + (stopped ? 0.25 * h_ * options_.stop_stiffness : 0);
+  return k.armature / h_ + 0.5 * k.damping +
+         0.25 * h_ * stop_slope(k, options_.stop_stiffness, from_->q[i] + 0.5 * d);
 }
 
 /// One joint of the exact Jacobian.  With B = A/h + ad_V A / 2:

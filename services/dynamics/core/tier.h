@@ -54,6 +54,9 @@ class TierStep {
   /// A revolute joint may turn this much further in one undivided step than its velocity says: beyond it a
   /// low-order step is too long for the motion or its root is spurious [rad].
   virtual double turn_bound() const noexcept { return std::numeric_limits<double>::infinity(); }
+  /// Iterations of a whole step after which no further part of it is begun: an adaptive tier divides by
+  /// itself.
+  virtual int budget() const noexcept { return std::numeric_limits<int>::max(); }
   /// One undivided step of h seconds, `from` to `to`, history included.  `to` means nothing when not
   /// usable().
   virtual StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept = 0;
@@ -65,11 +68,20 @@ class TierStep {
   }
 };
 
-/// Torque of the smooth hard stops: nothing inside the limits, stiffness times excess outside [N m or N].
+/// Way beyond a limit over which the smooth hard stops grow stiff [rad or m].
+inline constexpr double kStopWidth = 1e-3;
+/// Torque of the smooth hard stops at q, e beyond a limit: stiffness e^2 / (e + kStopWidth), against it [N m
+/// or N]. Continuous with its slope, which nowhere exceeds the stiffness; nothing inside the limits.
 inline double stop_torque(const rbd::JointNumbers& k, double stiffness, double q) noexcept {
-  if (q > k.upper) return stiffness * (k.upper - q);
-  if (q < k.lower) return stiffness * (k.lower - q);
+  const auto push = [&](double e) { return stiffness * (e * e / (e + kStopWidth)); };
+  if (q > k.upper) return -push(q - k.upper);
+  if (q < k.lower) return push(k.lower - q);
   return 0;
+}
+/// -d stop_torque / dq >= 0.
+inline double stop_slope(const rbd::JointNumbers& k, double stiffness, double q) noexcept {
+  const double e = q > k.upper ? q - k.upper : k.lower - q, r = kStopWidth / (e + kStopWidth);
+  return e > 0 ? stiffness * (1 - r * r) : 0;
 }
 
 }  // namespace hamel::dynamics

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/lie/so3.h"
 #include "services/perception/core/flaws.h"
 
 namespace hamel::perception {
@@ -48,6 +49,7 @@ Source::Source(const scene::PerceptionOptions& options)
 
 void Source::make_frames() {
   auto& samples = stream_.samples;
+  std::erase_if(samples, [this](const auto& s) { return s.t_s > stream_.until_s; });
   std::stable_sort(samples.begin(), samples.end(),
                    [](const auto& a, const auto& b) { return a.t_s != b.t_s ? a.t_s < b.t_s : a.id < b.id; });
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -55,6 +57,10 @@ void Source::make_frames() {
     frames_.back().end = i + 1;
     most_ = std::max(most_, frames_.back().end - frames_.back().begin);
   }
+  for (const double t_s : stream_.empty_s)
+    if (t_s <= stream_.until_s) frames_.push_back({t_s, 0, 0});
+  std::stable_sort(frames_.begin(), frames_.end(),
+                   [](const Frame& a, const Frame& b) { return a.t_s < b.t_s; });
   const std::size_t last = frames_.size() - 1;
   const bool steady = last > 0 && !is_gap(last - 1);
   const double interval_s = steady ? frames_[last].t_s - frames_[last - 1].t_s : stream_.rate / rate_hz_;
@@ -99,15 +105,26 @@ const scene::StreamSample* Source::find(std::size_t frame, std::uint32_t id) con
   return at != end && at->id == id ? &*at : nullptr;
 }
 
+/// The frame that follows, where one does.
+std::size_t Source::after(std::size_t frame) const {
+  return frame + 1 == frames_.size() && stream_.loop ? 0 : frame + 1;
+}
+
+double Source::span_s(std::size_t frame) const {
+  return (frame + 1 < frames_.size() ? frames_[frame + 1].t_s : end_s_) - frames_[frame].t_s;
+}
+
 /// The velocity of an obstacle from one frame to the next, in stream lengths per stream second; none where it
 /// is not in both, or nothing is known between them.
-std::optional<Eigen::Vector3d> Source::velocity(std::size_t frame, std::uint32_t id) const {
-  const bool wraps = stream_.loop && frame + 1 == frames_.size();
-  if ((!wraps && frame + 1 >= frames_.size()) || is_gap(frame)) return {};
-  const auto *here = find(frame, id), *next = find(wraps ? 0 : frame + 1, id);
+std::optional<lie::Twist> Source::velocity(std::size_t frame, std::uint32_t id) const {
+  if (frame >= frames_.size() || after(frame) >= frames_.size() || is_gap(frame)) return {};
+  const auto *here = find(frame, id), *next = find(after(frame), id);
   if (here == nullptr || next == nullptr) return {};
-  const double span_s = (wraps ? end_s_ : frames_[frame + 1].t_s) - frames_[frame].t_s;
-  return (next->p_m - here->p_m) / span_s;
+  lie::Twist v = lie::Twist::Zero();
+  if (here->R_SO != next->R_SO)
+    v.head<3>() = lie::log_so3(next->R_SO * here->R_SO.transpose()) / span_s(frame);
+  v.tail<3>() = (next->p_m - here->p_m) / span_s(frame);
+  return v;
 }
 
 /// One obstacle of the stream: on the line to its next place, else on the line from its last one, else
@@ -117,26 +134,30 @@ geometry::Obstacle Source::place(std::size_t frame, const scene::StreamSample& s
                                  double stream_t_s) const {
   geometry::Obstacle out;
   out.id = sample.id;
-  out.shape.kind = geometry::ShapeKind::sphere;
-  double radius_m = sample.radius_m;
+  out.shape = sample.shape;
+  out.sigma_m = sample.sigma_m * stream_.scale;
   const double since_s = stream_t_s - frames_[frame].t_s;
   const auto now = velocity(frame, sample.id);
   const auto before = frame > 0 ? velocity(frame - 1, sample.id) : std::nullopt;
   if (now) {
-    const bool wraps = frame + 1 == frames_.size();
-    const double span_s = (wraps ? end_s_ : frames_[frame + 1].t_s) - frames_[frame].t_s;
-    radius_m += (find(wraps ? 0 : frame + 1, sample.id)->radius_m - sample.radius_m) * (since_s / span_s);
+    const geometry::Shape& next = find(after(frame), sample.id)->shape;
+    if (next.kind == sample.shape.kind)
+      out.shape.dims_m += (next.dims_m - sample.shape.dims_m) * (since_s / span_s(frame));
   }
-  const Eigen::Vector3d v_S = now ? *now : before.value_or(Eigen::Vector3d::Zero());
+  const lie::Twist V_S = now ? *now : before.value_or(lie::Twist::Zero());
   out.velocity_known = false;
   for (const auto& v : {now, before, velocity(frame + 1, sample.id)}) {
-    if (out.velocity_known || !v || v->norm() * stream_.scale > stream_.glitch_mps || !(now || before))
+    if (out.velocity_known || !v || v->tail<3>().norm() * stream_.scale > stream_.glitch_mps ||
+        !(now || before))
       continue;
     out.velocity_known = true;
-    out.V_WO.tail<3>() = stream_.X_WS.R * *v * (stream_.scale * stream_.rate);
+    out.V_WO.head<3>() = stream_.X_WS.R * v->head<3>() * stream_.rate;
+    out.V_WO.tail<3>() = stream_.X_WS.R * v->tail<3>() * (stream_.scale * stream_.rate);
   }
-  out.shape.dims_m[0] = radius_m * stream_.scale;
-  out.X_WO.p = stream_.X_WS * Eigen::Vector3d(stream_.scale * (sample.p_m + v_S * since_s));
+  out.shape.dims_m *= stream_.scale;
+  out.X_WO.p = stream_.X_WS * Eigen::Vector3d(stream_.scale * (sample.p_m + V_S.tail<3>() * since_s));
+  if (sample.shape.kind == geometry::ShapeKind::sphere) return out;  // its frame means nothing
+  out.X_WO.R = stream_.X_WS.R * lie::exp_so3(V_S.head<3>() * since_s) * sample.R_SO;
   return out;
 }
 

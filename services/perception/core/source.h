@@ -24,9 +24,10 @@ inline constexpr double kLeastStreamRate_hz = 30;
 /// Stream: time in it is start_s + rate t.  Between two of its times an obstacle moves on the straight line
 /// between its two places, with that line's velocity.  An id that is absent from the next time goes on with
 /// its last velocity until then and is gone after; one that is seen a single time stands there with its
-/// velocity unknown.  A velocity over Stream::glitch_mps is that of a wrong sample and not used.  Flaws,
-/// where the options have them, are the same each time for the same set.  Before the first sample and behind
-/// the end there is nothing; the end is one sample interval behind the last.
+/// velocity unknown.  Turning and sizes go the same way.  A velocity over Stream::glitch_mps is that of a
+/// wrong sample and not used.  Flaws, where the options have them, are the same each time for the same set.
+/// Before the first sample and behind the end there is nothing; the end is one sample interval behind the
+/// last.
 class Source {
  public:
   /// The source, or what scene::problems() says of the options.  Copies the stream's samples.
@@ -48,7 +49,7 @@ class Source {
   std::size_t most_obstacles() const noexcept { return most_; }
 
  private:
-  /// The samples of one time, sorted by id.
+  /// The samples of one time, sorted by id; none: nothing is there.
   struct Frame {
     double t_s = 0;
     std::size_t begin = 0, end = 0;
@@ -56,9 +57,11 @@ class Source {
 
   explicit Source(const scene::PerceptionOptions& options);
   void make_frames();
+  std::size_t after(std::size_t frame) const;
+  double span_s(std::size_t frame) const;
   double seen(double t_s) const;
   double stream_time(double t_s) const;
-  std::optional<Eigen::Vector3d> velocity(std::size_t frame, std::uint32_t id) const;
+  std::optional<lie::Twist> velocity(std::size_t frame, std::uint32_t id) const;
   std::size_t frame_at(double stream_t_s) const;
   bool is_gap(std::size_t frame) const;
   bool in_gap(double stream_t_s, double& gap_end_s) const;
@@ -71,7 +74,7 @@ class Source {
   std::optional<scene::Flaws> flaws_;
   std::vector<Frame> frames_;
   double rate_hz_ = 0;
-  double end_s_ = 0;  ///< stream time at which the last sample is over
+  double end_s_ = 0;  ///< stream time at which the last frame is over
   std::size_t most_ = 0;
   bool moves_ = false;  ///< a scripted obstacle does
 };

@@ -1,0 +1,271 @@
+#include "clients/hamel/bench_bus.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "clients/hamel/bench_ping.h"
+
+namespace hamel::client {
+
+using namespace ping;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+Json row(const std::string& name, int processes, Times& t) {
+  return {{"pair", name},
+          {"processes", processes},
+          {"one_way_p50_us", quantile(t.there_us, 0.5)},
+          {"one_way_p99_us", quantile(t.there_us, 0.99)},
+          {"round_p50_us", quantile(t.round_us, 0.5)},
+          {"round_p99_us", quantile(t.round_us, 0.99)},
+          {"round_p999_us", quantile(t.round_us, 0.999)},
+          {"round_max_us", quantile(t.round_us, 1)},
+          {"lost", t.lost}};
+}
+
+std::string pair_name(Vendor a, Vendor b) {
+  return a == b ? to_string(a) : std::string(to_string(a)) + " - " + to_string(b);
+}
+
+Json between_processes(Vendor a, Vendor b, const BenchBusArgs& args) {
+  const Child other(other_process(b, args.domain));
+  Asker asker(a, args.domain);
+  if (!asker.wait_for_match(10s))
+    throw std::runtime_error(pair_name(a, b) + ": the two processes do not meet");
+  auto times = measure(args.samples, args.rate_hz, [&](Stamp& s) { return asker.ask(s, 200ms); });
+  return row(pair_name(a, b), 2, times);
+}
+
+Json within_process(Vendor a, Vendor b, const BenchBusArgs& args) {
+  std::atomic<bool> stop{false};
+  std::thread other([&] { answer(b, args.domain, stop); });
+  Times times;
+  {
+    Asker asker(a, args.domain);
+    if (asker.wait_for_match(10s))
+      times = measure(args.samples, args.rate_hz, [&](Stamp& s) { return asker.ask(s, 200ms); });
+    else
+      times.lost = args.samples;
+  }
+  stop = true;
+  other.join();
+  return row(pair_name(a, b), 1, times);
+}
+
+/// The answering process is killed and started again: from the start to its first answer.
+Json restart(Vendor a, Vendor b, const BenchBusArgs& args) {
+  Asker asker(a, args.domain);
+  std::vector<double> ms;
+  std::int64_t number = 0;
+  for (int i = 0; i < 6; ++i) {
+    const auto began = Clock::now();
+    const Child other(other_process(b, args.domain));
+    Stamp s;
+    do {
+      s = Stamp();
+      s.number = ++number;
+    } while (!asker.ask(s, 2ms) && Clock::now() - began < 10s);
+    if (i > 0) ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - began).count());
+  }
+  return {{"pair", pair_name(a, b)}, {"median_ms", quantile(ms, 0.5)}, {"longest_ms", quantile(ms, 1)}};
+}
+
+int udp_socket(sockaddr_in& address) {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof address;
+  if (bind(fd, reinterpret_cast<sockaddr*>(&address), length) != 0) throw std::runtime_error("no UDP socket");
+  getsockname(fd, reinterpret_cast<sockaddr*>(&address), &length);
+  const timeval limit{0, 200000};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  return fd;
+}
+
+/// The floor: the same over bare blocking sockets.
+Times bare_udp(int samples, double rate_hz) {
+  sockaddr_in here, there;
+  const int a = udp_socket(here), b = udp_socket(there);
+  const Child other([&] {
+    Payload p(kBytes);
+    while (true) {
+      if (recv(b, p.data(), p.size(), 0) <= 0) continue;
+      Stamp s = get(p);
+      s.answered_ns = now_ns();
+      put(s, p);
+      sendto(b, p.data(), p.size(), 0, reinterpret_cast<const sockaddr*>(&here), sizeof here);
+    }
+  });
+  Payload p;
+  auto times = measure(samples, rate_hz, [&](Stamp& s) {
+    put(s, p);
+    sendto(a, p.data(), p.size(), 0, reinterpret_cast<const sockaddr*>(&there), sizeof there);
+    while (recv(a, p.data(), p.size(), 0) > 0)
+      if (get(p).number == s.number) {
+        s = get(p);
+        return true;
+      }
+    return false;
+  });
+  close(a);
+  close(b);
+  return times;
+}
+
+/// How late a 1 kHz loop wakes in Node::wait(), with and without a process that keeps a processor busy.
+Json jitter(bool busy, const BenchBusArgs& args) {
+  std::unique_ptr<Child> load;
+  if (busy)
+    load = std::make_unique<Child>([] {
+      for (std::atomic<unsigned> i = 0;; ++i) {
+      }
+    });
+  const auto node = open(bus::kDefaultNetworkVendor, args.domain);
+  std::vector<double> late_us;
+  int missed = 0;
+  auto next = Clock::now();
+  for (int i = 0; i < args.samples; ++i) {
+    next += 1ms;
+    while (Clock::now() < next) node->wait(next);
+    const double late = std::chrono::duration<double, std::micro>(Clock::now() - next).count();
+    late_us.push_back(late);
+    if (late < 1000) continue;
+    missed += static_cast<int>(late / 1000);
+    next = Clock::now();
+  }
+  return {{"busy", busy},
+          {"late_p50_us", quantile(late_us, 0.5)},
+          {"late_p99_us", quantile(late_us, 0.99)},
+          {"late_max_us", quantile(late_us, 1)},
+          {"deadlines_missed", missed}};
+}
+
+/// Wall time of `hamel VERB` over so many seconds of the run.
+double wall_s(const std::vector<std::string>& verb, double duration_s, const std::string& scene) {
+  std::vector<std::string> words = verb;
+  words.insert(words.begin(), "hamel");
+  words.insert(words.end(), {scene, "--lockstep", "--set", "stop=at_duration", "--duration",
+                             fmt::format("{}", duration_s), "--json"});
+  std::vector<char*> argv;
+  for (auto& w : words) argv.push_back(w.data());
+  argv.push_back(nullptr);
+  const auto began = Clock::now();
+  const pid_t pid = fork();
+  if (pid == 0) {
+    const int null = ::open("/dev/null", O_WRONLY);
+    dup2(null, STDOUT_FILENO);
+    dup2(null, STDERR_FILENO);
+    execv("/proc/self/exe", argv.data());
+    _exit(127);
+  }
+  waitpid(pid, nullptr, 0);
+  return std::chrono::duration<double>(Clock::now() - began).count();
+}
+
+std::string find_scene() {
+  const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  for (const char* at : {"../share/hamel/scenes", "../../../deploy/scenes"})
+    if (const auto p = here / at / "four_link_avoid.textproto"; std::filesystem::exists(p)) return p.string();
+  return "";
+}
+
+/// The bus's part of a lockstep step over three processes: a run less the same run in one process, its
+/// start-up cancelled by a shorter one.
+Json lockstep(Vendor vendor, double udp_round_us, const BenchBusArgs& args) {
+  const std::string scene = find_scene();
+  if (scene.empty()) return {{"bus", to_string(vendor)}, {"error", "four_link_avoid is not installed"}};
+  constexpr double kShort = 1, kLong = 9;
+  const std::vector<std::string> up{"up", "--bus", to_string(vendor), "--domain",
+                                    std::to_string(args.domain)};
+  const double steps = (kLong - kShort) * 1000;
+  const double there = (wall_s(up, kLong, scene) - wall_s(up, kShort, scene)) / steps;
+  const double here = (wall_s({"run"}, kLong, scene) - wall_s({"run"}, kShort, scene)) / steps;
+  const double bus_us = std::max(there - here, 1e-9) * 1e6;
+  return {{"bus", to_string(vendor)},
+          {"steps_per_s", 1 / there},
+          {"tick_us", here * 1e6},
+          {"bus_us_per_step", bus_us},
+          {"of_what_udp_allows", udp_round_us / bus_us}};
+}
+
+void print(const Json& all) {
+  fmt::print("{} bytes at {} Hz, microseconds\n", kBytes, all["rate_hz"].get<double>());
+  fmt::print("{:<26} {:>5} {:>8} {:>8} {:>10} {:>8} {:>8} {:>9} {:>5}\n", "", "proc", "one way", "p99",
+             "round trip", "p99", "p99.9", "max", "lost");
+  const auto us = [](const Json& r, const char* key) { return r[key].get<double>(); };
+  for (const auto& r : all["latency"])
+    fmt::print("{:<26} {:>5} {:>8.1f} {:>8.1f} {:>10.1f} {:>8.1f} {:>8.1f} {:>9.1f} {:>5}\n",
+               r["pair"].get<std::string>(), r["processes"].get<int>(), us(r, "one_way_p50_us"),
+               us(r, "one_way_p99_us"), us(r, "round_p50_us"), us(r, "round_p99_us"), us(r, "round_p999_us"),
+               us(r, "round_max_us"), r["lost"].get<int>());
+  for (const auto& r : all["restart"])
+    fmt::print("{:<26} back after kill -9: median {:.0f} ms, longest {:.0f} ms\n",
+               r["pair"].get<std::string>(), us(r, "median_ms"), us(r, "longest_ms"));
+  for (const auto& r : all["loop"])
+    fmt::print("1 kHz loop{:<16} late p50 {:.0f}, p99 {:.0f}, max {:.0f}; {} deadlines missed\n",
+               r["busy"].get<bool>() ? ", one core busy" : "", us(r, "late_p50_us"), us(r, "late_p99_us"),
+               us(r, "late_max_us"), r["deadlines_missed"].get<int>());
+  for (const auto& r : all["lockstep"]) {
+    if (r.contains("error")) continue;
+    fmt::print(
+        "lockstep over {:<12} {:.0f} steps/s in three processes; bus {:.0f} us a step beside {:.0f} us of "
+        "work: "
+        "{:.2f} of what a UDP round trip allows\n",
+        r["bus"].get<std::string>(), us(r, "steps_per_s"), us(r, "bus_us_per_step"), us(r, "tick_us"),
+        us(r, "of_what_udp_allows"));
+  }
+}
+
+bool passes(const Json& all) {
+  bool good = true;
+  for (const auto& r : all["latency"]) good &= r["lost"].get<int>() == 0;
+  for (const auto& r : all["lockstep"])
+    good &= !r.contains("error") && r["of_what_udp_allows"].get<double>() >= 0.5;
+  return good;
+}
+
+}  // namespace
+
+int bench_bus(const BenchBusArgs& args) {
+  if (!args.answer.empty()) {
+    const auto vendor = bus::vendor_from(args.answer);
+    if (!vendor) return runtime::kBadInput;
+    answer(vendor.value(), args.domain, std::atomic<bool>(false));
+  }
+  if (const auto p = runtime::go_realtime({.cpu = args.cpu}); !p.empty())
+    return runtime::complain("hamel bench bus", p);
+  constexpr Vendor fast = Vendor::fastdds, cyclone = Vendor::cyclonedds;
+  Json all{{"rate_hz", args.rate_hz}, {"samples", args.samples}, {"cpu", args.cpu}};
+  auto udp = bare_udp(args.samples, args.rate_hz);
+  all["latency"].push_back(row("UDP", 2, udp));
+  all["latency"].push_back(within_process(Vendor::inproc, Vendor::inproc, args));
+  for (const Vendor v : {fast, cyclone}) all["latency"].push_back(within_process(v, v, args));
+  for (const auto& [a, b] : {std::pair{fast, fast}, {cyclone, cyclone}, {fast, cyclone}, {cyclone, fast}})
+    all["latency"].push_back(between_processes(a, b, args));
+  for (const auto& [a, b] : {std::pair{fast, fast}, {cyclone, cyclone}, {fast, cyclone}, {cyclone, fast}})
+    all["restart"].push_back(restart(a, b, args));
+  for (const bool busy : {false, true}) all["loop"].push_back(jitter(busy, args));
+  auto flat = bare_udp(args.samples, 0);
+  const double udp_round_us = quantile(flat.round_us, 0.5);
+  all["udp_round_flat_out_us"] = udp_round_us;
+  for (const Vendor v : {fast, cyclone}) all["lockstep"].push_back(lockstep(v, udp_round_us, args));
+  if (args.json)
+    fmt::print("{}\n", all.dump(1));
+  else
+    print(all);
+  return !args.check || passes(all) ? runtime::kDone : runtime::kFailed;
+}
+
+}  // namespace hamel::client

@@ -1,0 +1,77 @@
+#pragma once
+/// What a vendor's threads tell about the ends of a node, and how its owner hears of it.  Private to
+/// common/bus.
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "common/bus/network.h"
+#include "common/bus/notifier.h"
+
+namespace hamel::bus {
+
+/// The notifier of a node, and the disagreements that its owner has not told yet.
+class Inbound {
+ public:
+  Notifier notifier;
+
+  void disagree(const Disagreement& d) {
+    {
+      const std::lock_guard lock(mutex_);
+      untold_.push_back(d);
+    }
+    any_ = true;
+    notifier.notify();
+  }
+  void count(std::int32_t change) { incompatible_ += static_cast<std::uint64_t>(std::max(change, 0)); }
+  std::uint64_t incompatible() const { return incompatible_; }
+
+  /// Waits as Node::wait() does, then tells what is untold to `tell(Disagreement)`.
+  template <class Tell>
+  bool wait(std::chrono::steady_clock::time_point deadline, Tell tell) {
+    const bool woken = notifier.wait(deadline);
+    if (!any_.exchange(false)) return woken;
+    std::vector<Disagreement> untold;
+    {
+      const std::lock_guard lock(mutex_);
+      untold.swap(untold_);
+    }
+    for (const Disagreement& d : untold) tell(d);
+    return woken;
+  }
+
+ private:
+  std::atomic<bool> any_{false};
+  std::atomic<std::uint64_t> incompatible_{0};
+  std::mutex mutex_;
+  std::vector<Disagreement> untold_;
+};
+
+/// One end of a topic.  Kept until the participant is gone, so that a callback on its way finds it in place.
+struct Events {
+  Events(const Topic& t, Inbound& i, bool writes) : topic(t), inbound(i), we_write(writes) {}
+
+  void incompatible_with(int policy, std::int32_t change) {
+    if (!said.exchange(true)) inbound.disagree({&topic, we_write, policy});
+    incompatible += static_cast<std::uint64_t>(std::max(change, 0));
+    inbound.count(change);
+  }
+  static void add(std::atomic<std::uint64_t>& counter, std::int32_t change) {
+    counter += static_cast<std::uint64_t>(std::max(change, 0));
+  }
+  Counters counters(std::uint64_t samples, std::uint64_t refused, std::uint64_t disposed = 0) const {
+    return {samples, lost, refused, incompatible, disposed, late, silent};
+  }
+
+  const Topic& topic;
+  Inbound& inbound;
+  const bool we_write;
+  std::atomic<int> matched{0};
+  std::atomic<std::uint64_t> incompatible{0}, lost{0}, late{0}, silent{0};
+  std::atomic<bool> said{false};
+};
+
+}  // namespace hamel::bus

@@ -1,0 +1,60 @@
+#include "common/runtime/presence.h"
+
+#include "common/runtime/log.h"
+#include "common/runtime/options.h"
+
+namespace hamel::runtime {
+
+namespace {
+constexpr std::size_t kMostPeers = 256;
+}  // namespace
+
+Presence::Presence(bus::Node& node, wire::ServiceKind kind, std::uint32_t arm)
+    : node_(node), out_(node), in_(node) {
+  status_.kind = kind;
+  status_.arm = arm;
+  status_.version = version();
+  status_.idl_hash = wire::idl_hash();
+  status_.bus = bus::to_string(node.options().vendor);
+}
+
+void Presence::hear() {
+  wire::ServiceStatus s;
+  while (in_.take(s)) {
+    const bus::WriterId from = in_.from();
+    if (from == out_.id() || s.state == wire::ServiceState::stopping) continue;
+    const std::string said = s.version + s.idl_hash;
+    const auto known = known_.find(from);
+    if (known != known_.end() && known->second == said) continue;
+    if (known_.size() >= kMostPeers) known_.clear();
+    known_[from] = said;
+    if (s.idl_hash != status_.idl_hash || s.version != status_.version) {
+      strangers_ += s.idl_hash != status_.idl_hash;
+      spdlog::warn("{} of arm {} is {} with IDL {}; this is {} with IDL {}: {}", wire::to_string(s.kind),
+                   s.arm, s.version, s.idl_hash, status_.version, status_.idl_hash,
+                   s.idl_hash != status_.idl_hash ? "they may not understand each other" : "same wire");
+    }
+    if (s.kind == status_.kind && s.arm == status_.arm) {
+      ++doubles_;
+      spdlog::warn("another {} of arm {} runs on this domain ({}, {})", wire::to_string(s.kind), s.arm, s.bus,
+                   s.detail);
+    }
+  }
+}
+
+void Presence::say(Clock::time_point now, Condition condition) {
+  last_ = now;
+  hear();
+  status_.state = condition.state == wire::ServiceState::ready && strangers_ > 0
+                      ? wire::ServiceState::degraded
+                      : condition.state;
+  status_.incarnation = condition.incarnation;
+  status_.detail = std::move(condition.detail);
+  status_.counters = std::move(condition.counters);
+  status_.counters.push_back({"peers_of_other_idl", strangers_});
+  status_.counters.push_back({"peers_of_same_name", doubles_});
+  status_.counters.push_back({"qos_incompatible", node_.incompatible()});
+  out_.publish(status_);
+}
+
+}  // namespace hamel::runtime

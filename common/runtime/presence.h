@@ -1,0 +1,45 @@
+#pragma once
+/// Who runs here: a service says so twice a second, and looks at what the others say.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/runtime/loop.h"
+#include "common/wire/endpoint.h"
+
+namespace hamel::runtime {
+
+/// What a service says about itself beside its name, version and bus.
+struct Condition {
+  wire::ServiceState state = wire::ServiceState::ready;
+  std::uint64_t incarnation = 0;
+  std::string detail;
+  std::vector<wire::Counter> counters;
+};
+
+/// A peer of another version or IDL, and a second service of the same kind and arm, are named in one log line
+/// each and counted in our own status, which then is DEGRADED where the IDL differs.
+class Presence {
+ public:
+  Presence(bus::Node& node, wire::ServiceKind kind, std::uint32_t arm);
+  bool due(Clock::time_point now) const { return now - last_ >= std::chrono::milliseconds(500); }
+  /// Hears the others and says `condition`, with counters of its own added.
+  void say(Clock::time_point now, Condition condition);
+
+  std::uint64_t strangers() const { return strangers_; }  ///< peers of another IDL seen so far
+  std::uint64_t doubles() const { return doubles_; }      ///< others of our kind and arm seen so far
+
+ private:
+  void hear();
+
+  bus::Node& node_;
+  wire::ServiceStatus status_;
+  wire::Publisher<wire::ServiceStatus> out_;
+  wire::Subscription<wire::ServiceStatus> in_;
+  std::map<bus::WriterId, std::string> known_;  ///< the version each said last
+  std::uint64_t strangers_ = 0, doubles_ = 0;
+  Clock::time_point last_{};
+};
+
+}  // namespace hamel::runtime

@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""doctor, topic, several arms, real time on request, the word to systemd."""
+
+import json
+import os
+import pathlib
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+from programs import BIN, ROOT, Up, hamel, main, scene
+
+VENDORS = ("fastdds", "cyclonedds")
+
+
+class Doctor(unittest.TestCase):
+    def test_says_what_it_looked_at_and_names_an_interface_that_is_not_there(self):
+        code, out, err = hamel("doctor", "--json", "--domain", 83)
+        findings = {f["what"]: f for f in json.loads(out)["findings"]}
+        for what in ("version", "interface lo", "fastdds on domain 83", "cyclonedds on domain 83", "domain 83", "clock", "--priority"):
+            self.assertIn(what, findings)
+        self.assertEqual(code, 0, out)
+        code, out, err = hamel("doctor", "--interface", "nosuch0", "--domain", 83)
+        self.assertEqual(code, 1, out)
+        self.assertIn("WRONG", out)
+        self.assertIn("nosuch0", out)
+
+
+class Topic(unittest.TestCase):
+    def test_nobody_there_is_exit_code_three(self):
+        for verb in (["list"], ["echo", "state", "--seconds", 1], ["hz", "--seconds", 1], ["latency", "--seconds", 1]):
+            code, _, err = hamel("topic", *verb, "--domain", 84)
+            self.assertEqual(code, 3, (verb, err))
+            self.assertIn("84", err)
+        self.assertEqual(hamel("topic", "echo", "nosuch", "--domain", 84)[0], 2)
+
+    def test_every_vendor_sees_the_topics_of_the_other(self):
+        for i, (there, here) in enumerate((VENDORS, VENDORS[::-1])):
+            with self.subTest(there), Up(scene("four_link_avoid"), "--bus", there, "--domain", 85 + i, "--duration", 25) as up:
+                up.child("dynamics")
+                asked = ["--bus", here, "--domain", 85 + i]
+                code, out, err = hamel("topic", "list", *asked)
+                self.assertEqual(code, 0, err)
+                for word in ("hamel/v1/state  hamel::v1::ArmState", "writes hamel-dynamics", "reads  hamel-planner"):
+                    self.assertIn(word, out)
+                code, out, err = hamel("topic", "echo", "state", "--count", 2, "--json", *asked)
+                self.assertEqual(code, 0, err)
+                first, second = map(json.loads, out.splitlines())
+                self.assertEqual(first["arm"], 1)
+                self.assertGreater(second["step"], first["step"])
+                code, out, err = hamel("topic", "hz", "--json", *asked)
+                self.assertEqual(code, 0, err)
+                rates = {t["topic"]: t for t in json.loads(out)["topics"]}
+                self.assertGreater(rates["state"]["messages"], 100)
+                self.assertEqual(rates["state"]["broken"], 0)
+                code, out, err = hamel("topic", "latency", "--json", *asked)
+                self.assertEqual(code, 0, err)
+                self.assertGreater(json.loads(out)["answers"], 100)
+
+
+class Arms(unittest.TestCase):
+    def test_two_arms_in_one_process_each_go_to_their_own_goal(self):
+        with tempfile.TemporaryDirectory() as folder:
+            text = pathlib.Path(scene("four_link_avoid")).read_text()
+            text = text.replace("../robots", str(ROOT / "deploy/robots")).replace("gyro_paper", "gyro")
+            paths = [pathlib.Path(folder) / f"arm{n}.textproto" for n in (1, 2)]
+            for n, path in enumerate(paths, 1):
+                path.write_text(text + f"\narm: {n}\n")
+            common = [*map(str, paths), "--domain", "87"]
+            services = [subprocess.Popen([BIN / f"hamel-{s}", *common]) for s in ("perception", "planner", "dynamics")]
+            try:
+                code, out, err = hamel("hold", "--arm", 1, "--domain", 87)
+                self.assertEqual(code, 0, err)
+                before = self.state(1)
+                code, out, err = hamel("goal", "--arm", 2, "--position", 2, -2, 0, "--domain", 87)
+                self.assertEqual(code, 0, err)
+                self.assertIn("arm 2", out)
+                start = self.state(2)
+                end = time.monotonic() + 30
+                while time.monotonic() < end and abs(self.state(2) - start) < 0.05:
+                    pass
+                self.assertGreater(abs(self.state(2) - start), 0.05, "arm 2 goes")
+                self.assertLess(abs(self.state(1) - before), 1e-3, "arm 1 does not")
+                code, out, err = hamel("status", "--domain", 87)
+                for name in ("arm 1 dynamics", "arm 2 dynamics", "arm 1 planner", "arm 2 planner"):
+                    self.assertIn(name, out)
+            finally:
+                for s in services:
+                    s.terminate()
+                self.assertEqual([s.wait(20) for s in services], [0, 0, 0])
+
+    def state(self, arm):
+        code, out, err = hamel("topic", "echo", "state", "--arm", arm, "--count", 1, "--json", "--domain", 87)
+        self.assertEqual(code, 0, err)
+        return json.loads(out)["position[0]"]
+
+    def test_one_arm_twice_in_one_process_is_refused(self):
+        done = subprocess.run([BIN / "hamel-dynamics", scene("four_link_avoid"), scene("panda_reach"), "--domain", "88"],
+                              capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("arm 1", done.stderr)
+
+
+class RealTime(unittest.TestCase):
+    def test_a_request_is_granted_or_refused_with_its_remedy(self):
+        for options, remedy in ((["--priority", "50"], "RTPRIO"), (["--lock-memory"], "MEMLOCK"), (["--cpu", "999"], "taskset")):
+            done = subprocess.run([BIN / "hamel-dynamics", scene("three_link_swing"), "--domain", "88", "--duration", "0.05", *options],
+                                  capture_output=True, text=True, timeout=60)
+            self.assertIn(done.returncode, (0, 2), done.stderr)
+            if done.returncode == 2:
+                self.assertIn(remedy, done.stderr)
+        self.assertEqual(done.returncode, 2, "no machine has a thousand processors here")
+
+
+class Systemd(unittest.TestCase):
+    def test_is_told_ready_alive_and_stopping(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "notify")
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as s:
+                s.bind(path)
+                s.settimeout(30)
+                env = dict(os.environ, NOTIFY_SOCKET=path, WATCHDOG_USEC="200000")
+                p = subprocess.Popen([BIN / "hamel-perception", scene("four_link_avoid"), "--domain", "89"], env=env)
+                self.assertEqual(s.recv(100), b"READY=1")
+                self.assertEqual(s.recv(100), b"WATCHDOG=1")
+                self.assertEqual(s.recv(100), b"WATCHDOG=1")
+                p.terminate()
+                said = {s.recv(100)}
+                while b"STOPPING=1" not in said:
+                    said.add(s.recv(100))
+                self.assertEqual(p.wait(10), 0)
+
+
+if __name__ == "__main__":
+    main()
