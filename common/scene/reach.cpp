@@ -10,6 +10,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kSlack_m = 1e-9;  // rounding of distances
+constexpr double kNear_m = 0.1;    // what sift_near() found is good for so far a way of each link
 
 /// How far joint i may slide.
 double travel_m(const model::Joint& joint) {
@@ -76,11 +77,24 @@ double distance_m(const Vector3d& p_W, const geometry::Obstacle& o) {
 Reach::Reach(const Robot& robot, const PlannerOptions& options)
     : target_(target_ball(robot, options)),
       chain_(robot.chain),
+      ws_(chain_),
+      lever_m_(Eigen::VectorXd::Zero(chain_.n())),
       rho0_m_(options.rho0_m),
       margin_m_(options.barrier_gain > 0 ? options.dmin_m : 0),
       assumed_speed_mps_(options.assumed_speed_mps) {
-  for (const LinkShape& s : robot.shapes)
-    if (s.link >= 0) balls_.push_back(ball_of(chain_, s.link, s.X_LS * geometry::enclosing_capsule(s.shape)));
+  for (const LinkShape& s : robot.shapes) {
+    if (s.link < 0) continue;
+    bodies_.push_back({s.link, s.X_LS * geometry::enclosing_capsule(s.shape)});
+    const geometry::Capsule& c = bodies_.back().capsule_B;
+    balls_.push_back(ball_of(chain_, s.link, c));
+    double beyond = std::max(c.p0.norm(), c.p1.norm());  // from joint j's origin to the capsule's axis
+    for (int j = s.link; j >= 0; --j) {
+      const model::Joint& joint = chain_.joint(j);
+      const bool slides = joint.kind == model::JointKind::prismatic;
+      lever_m_[j] = std::max(lever_m_[j], slides ? 1.0 : beyond);
+      beyond += joint.X_PJ.p.norm() + travel_m(joint);
+    }
+  }
 }
 
 bool Reach::holds(const Eigen::VectorXd& q) const noexcept {
@@ -98,14 +112,60 @@ double Reach::spread_m(const geometry::Obstacle& o, double horizon_s) const noex
   return v > 0 ? v * horizon_s : 0;
 }
 
+/// What the planner inflates it by, at most.
+double Reach::grows_m(const geometry::Obstacle& o, double horizon_s) const noexcept {
+  const double aged = o.velocity_known || assumed_speed_mps_ == 0 ? 0 : assumed_speed_mps_ * horizon_s;
+  return 2 * std::max(o.sigma_m, 0.0) + aged;
+}
+
+bool Reach::may_cover_target(const geometry::Obstacle& o, double way_m, double grown_m) const noexcept {
+  const double least = distance_m(target_.centre_W, o) - target_.axis_m - target_.radius_m - way_m;
+  return !(least - grown_m > margin_m_);
+}
+
+bool Reach::stays_near(const Eigen::VectorXd& q) const noexcept {
+  if (q.size() != q_near_.size()) return false;
+  double way = 0;
+  for (Eigen::Index j = 0; j < q.size(); ++j) way += lever_m_[j] * std::abs(q[j] - q_near_[j]);
+  return way <= kNear_m;
+}
+
+void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstacle> set,
+                      std::vector<geometry::Obstacle>& kept) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const auto stands = [](const geometry::Obstacle& o) {
+    return is_plain(o) && o.velocity_known && o.V_WO.isZero(0);
+  };
+  q_near_ = q;
+  rbd::positions(chain_, q, ws_);
+  const std::size_t m = bodies_.size();
+  near_m_.assign(set.size() * m, inf);
+  std::vector<double> nearest(static_cast<std::size_t>(chain_.n()), inf);
+  for (std::size_t b = 0; b < m; ++b) {
+    const auto link = static_cast<std::size_t>(bodies_[b].link);
+    const geometry::Capsule c = ws_.X_WB[link] * bodies_[b].capsule_B;
+    for (std::size_t k = 0; k < set.size(); ++k) {
+      if (!stands(set[k])) continue;
+      near_m_[k * m + b] = geometry::closest(c, set[k].shape, set[k].X_WO).distance_m;
+      nearest[link] = std::min(nearest[link], near_m_[k * m + b]);
+    }
+  }
+  kept.clear();
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    const double grown = grows_m(set[k], 0);
+    bool matters = !stands(set[k]) || may_cover_target(set[k], kSlack_m, grown);
+    for (std::size_t b = 0; b < m && !matters; ++b) {
+      const double most = std::max(rho0_m_ + grown, nearest[static_cast<std::size_t>(bodies_[b].link)]);
+      matters = !(near_m_[k * m + b] > most + 2 * kNear_m + kSlack_m);
+    }
+    if (matters) kept.push_back(set[k]);
+  }
+}
+
 void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
                  std::vector<geometry::Obstacle>& kept, std::vector<double>& floor_m) const {
   constexpr double inf = std::numeric_limits<double>::infinity();
   const auto n = static_cast<std::size_t>(chain_.n());
-  const auto grows_m = [&](const geometry::Obstacle& o) {
-    const double aged = o.velocity_known || assumed_speed_mps_ == 0 ? 0 : assumed_speed_mps_ * horizon_s;
-    return 2 * std::max(o.sigma_m, 0.0) + aged;
-  };
   kept.clear();
   floor_m.assign(n, inf);
   std::vector<double> nearest_at_most(n, inf);  // of the obstacle that is nearest to each link
@@ -123,23 +183,19 @@ void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
       const double s = distance_m(ball.centre_W, o) - ball.radius_m, way = spread_m(o, horizon_s) + kSlack_m;
       centre[k * balls_.size() + b] = s;
       nearest_at_most[link] = std::min(nearest_at_most[link], s + ball.axis_m + way);
-      floor_m[link] = std::min(floor_m[link], s - ball.axis_m - way - grows_m(o));
+      floor_m[link] = std::min(floor_m[link], s - ball.axis_m - way - grows_m(o, horizon_s));
     }
   }
   for (std::size_t k = 0; k < set.size(); ++k) {
     const geometry::Obstacle& o = set[k];
     bool matters = !is_plain(o);
-    const double way = spread_m(o, horizon_s) + kSlack_m, grown = grows_m(o);
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = grows_m(o, horizon_s);
     for (std::size_t b = 0; b < balls_.size() && !matters; ++b) {
       const double least = centre[k * balls_.size() + b] - balls_[b].axis_m - way;
       const double nearest = nearest_at_most[static_cast<std::size_t>(balls_[b].link)];
       matters = !(least - grown > rho0_m_ && least > nearest);
     }
-    if (!matters) {
-      const double at_target = distance_m(target_.centre_W, o) - target_.axis_m - target_.radius_m - way;
-      matters = !(at_target - grown > margin_m_);
-    }
-    if (matters) kept.push_back(o);
+    if (matters || may_cover_target(o, way, grown)) kept.push_back(o);
   }
 }
 

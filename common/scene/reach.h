@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/geometry/distance.h"
+#include "common/rbd/rbd.h"
 #include "common/scene/scene.h"
 
 namespace hamel::scene {
@@ -40,14 +41,33 @@ class Reach {
   void sift(std::span<const geometry::Obstacle> set, double horizon_s, std::vector<geometry::Obstacle>& kept,
             std::vector<double>& floor_m) const;
 
+  /// Of a sifted set, puts into `kept` what matters while the arm stays about q: drops standing obstacles out
+  /// of reach that others are surely nearer than.  Good while stays_near() says so.  O(links x obstacles).
+  void sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstacle> set,
+                 std::vector<geometry::Obstacle>& kept);
+  /// True while no link has gone farther than a margin from where it was at the last sift_near(): each joint
+  /// moves what it carries by no more than its own way times the reach beyond it.  O(n).
+  bool stays_near(const Eigen::VectorXd& q) const noexcept;
+
   std::span<const ReachBall> balls() const noexcept { return balls_; }
 
  private:
   double spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
 
+  struct Body {
+    int link = 0;
+    geometry::Capsule capsule_B;
+  };
+  double grows_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
+  bool may_cover_target(const geometry::Obstacle& o, double way_m, double grown_m) const noexcept;
+
   std::vector<ReachBall> balls_;
-  ReachBall target_;  ///< where the end effector's body is when it is at a target that can be reached
+  std::vector<Body> bodies_;  ///< one a ball
+  ReachBall target_;          ///< where the end effector's body is when it is at a target that can be reached
   model::Chain chain_;
+  rbd::Workspace ws_;
+  Eigen::VectorXd q_near_, lever_m_;  ///< where the last sift_near() was; how far each joint moves the arm
+  std::vector<double> near_m_;        ///< scratch: distances of bodies and obstacles
   double rho0_m_ = 0, margin_m_ = 0, assumed_speed_mps_ = 0;
 };
 

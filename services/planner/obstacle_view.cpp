@@ -73,13 +73,19 @@ double ObstacleView::at(double t_s, const Eigen::VectorXd& q, wire::Causes& caus
   }
   if (changed_) put_together();
   const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q);
-  shown_ = sound && cull_ ? std::span<const geometry::Obstacle>(kept_) : all_;
+  shown_ = all_;
+  if (sound && cull_) {
+    if (near_is_old_ || !reach_->stays_near(q)) reach_->sift_near(q, kept_, near_);
+    near_is_old_ = false;
+    shown_ = near_;
+  }
   floor_shown_ = sound && skip_links_ ? std::span<const double>(floor_m_) : std::span<const double>();
   return any ? oldest : std::numeric_limits<double>::infinity();
 }
 
 void ObstacleView::put_together() {
   changed_ = false;
+  near_is_old_ = true;
   all_.clear();
   for (const auto& [source, queue] : sources_)
     if (current(queue))

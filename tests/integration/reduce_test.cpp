@@ -155,10 +155,13 @@ TEST(ExactReductions, HandThePlannerFewOfAThousand) {
   s.duration_s = 0.2;
   expect_equal(s);
   const scene::Scene exact = as(s, scene::Fidelity::exact);
-  for (const scene::Reduction& r : exact.reductions)
-    if (r.name == "obstacles") {
-      EXPECT_LE(r.after, 30) << "of " << r.before;
-    }
+  planner::ObstacleView view(exact);
+  wire::ObstacleSet set;
+  for (const scene::ScriptedObstacle& o : exact.perception.obstacles) set.obstacles.push_back(o.at_start);
+  view.add(set);
+  wire::Causes causes;
+  (void)view.at(0, exact.q0, causes);
+  EXPECT_LE(view.obstacles().size(), 30u) << "of " << set.obstacles.size();
 }
 
 }  // namespace
