@@ -6,7 +6,7 @@
 
 #include "clients/hamel/ticks.h"
 #include "common/base/text.h"
-#include "common/rbd/rbd.h"
+#include "common/rbd/planar_chain.h"
 
 namespace hamel::client {
 
@@ -16,13 +16,13 @@ using scene::Tier;
 using trade::kSamples;
 
 constexpr int kHalvings = 5;      // of a steered reference's step
-constexpr double kBetween = 2;     // an error between two instants, of the largest at one
+constexpr double kBetween = 2;    // an error between two instants, of the largest at one
 constexpr double kCycle_us = 12;  // one planner cycle
 constexpr double kShortRun_s = 0.05;
 
 /// What an evaluation usually takes [us]: a fixed part and one for each joint, measured on one core.
 double evaluation_us(const scene::Scene& s, const scene::DynamicsOptions& o) {
-  const bool flat = s.dynamics.space == scene::Space::automatic;
+  const bool flat = s.dynamics.space == scene::Space::automatic && rbd::is_planar(s.robot.chain);
   const double n = s.robot.chain.n();
   switch (o.tier) {
     case Tier::gauss:
@@ -186,7 +186,8 @@ Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
     if (watch.stop()) return out;
     out.tried.push_back(measure(with(s, o), out.reference, watch));
     const Setting& now = out.tried.back();
-    if (meets(s.accuracy, now, out.reference) && (!out.chosen || now.work_per_s < out.chosen->work_per_s)) out.chosen = now;
+    if (meets(s.accuracy, now, out.reference) && (!out.chosen || now.work_per_s < out.chosen->work_per_s))
+      out.chosen = now;
   }
   return out;
 }

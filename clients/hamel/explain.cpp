@@ -7,6 +7,7 @@
 
 #include "clients/hamel/explain_cost.h"
 #include "common/files/scene_text.h"
+#include "common/rbd/planar_chain.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
 #include "common/scene/reduce.h"
@@ -18,7 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* space_of(const scene::Scene& s) {
-  return s.dynamics.space == scene::Space::automatic ? "SE2" : "SE3";
+  return s.dynamics.space == scene::Space::automatic && rbd::is_planar(s.robot.chain) ? "SE2" : "SE3";
 }
 
 std::string quantity(double v, const std::string& unit) {

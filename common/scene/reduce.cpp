@@ -63,7 +63,7 @@ void reduce_plane(Scene& s) {
   const bool planar = rbd::is_planar(s.robot.chain);
   const bool asked_off = s.dynamics.space == Space::se3 || !wanted(s.reduce, s.reduce.plane, true);
   const bool on = planar && !asked_off;
-  s.dynamics.space = on ? Space::automatic : Space::se3;
+  if (planar && !on) s.dynamics.space = Space::se3;
   const std::string why = !planar ? "revolute axes are not all parallel, or a slide is not across them"
                           : on    ? "all revolute axes parallel, all slides across them"
                                   : "forbidden";

@@ -103,7 +103,7 @@ TEST(SceneText, FourLinkAvoidIsSetS1) {
 
 TEST(SceneText, DefaultsAreThoseOfTheOptions) {
   const Scratch file(kRobot);
-  const auto scene = load_scene(file.path());
+  const auto scene = read_scene(file.path());
   ASSERT_TRUE(scene) << to_string(scene.error().front());
   const scene::Scene& s = scene.value();
   EXPECT_EQ(s.planner.kv, scene::PlannerOptions{}.kv);
@@ -275,7 +275,7 @@ TEST(Overrides, ReplaceValuesOfEveryType) {
                        "arm=3",
                        "dynamics.bus=\"cyclonedds\"",
                        "gravity_mps2=[0, 0, -1]"};
-  const auto scene = load_scene(kScenes + "four_link_avoid.textproto", sets);
+  const auto scene = read_scene(kScenes + "four_link_avoid.textproto", sets);
   ASSERT_TRUE(scene) << to_string(scene.error().front());
   const scene::Scene& s = scene.value();
   EXPECT_EQ(s.planner.method, scene::Method::gyro);
