@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "common/bus/backends.h"
+#include "common/bus/cyclone_config.h"
 #include "common/bus/cyclone_sertype.h"
 #include "common/bus/events.h"
 #include "common/bus/payload.h"
@@ -51,56 +52,6 @@ std::string refusal(dds_return_t code) {
   return "Cyclone DDS refuses: " + (words.empty() ? std::string(dds_strretcode(-code)) : words);
 }
 
-std::string element(const std::string& name, const std::string& inside) {
-  return "<" + name + ">" + inside + "</" + name + ">";
-}
-std::string element(const std::string& name, std::chrono::milliseconds ms) {
-  return element(name, std::to_string(ms.count()) + "ms");
-}
-
-/// DDS Security by the files of an identity.  Debian keeps the plugins where the loader does not look.
-constexpr const char* kPlugins = CYCLONEDDS_PLUGINS;
-std::string security(const Identity& identity) {
-  const auto file = [](const std::string& name, const std::string& path) {
-    return element(name, "file:" + path);
-  };
-  const auto plugin = [](const std::string& library, const std::string& function) {
-    return "<Library path=\"" + std::string(kPlugins) + "/libdds_security_" + library +
-           ".so\" initFunction=\"init_" + function + "\" finalizeFunction=\"finalize_" + function + "\"/>";
-  };
-  return element(
-      "Security",
-      element("Authentication", plugin("auth", "authentication") + file("IdentityCA", identity.ca) +
-                                    file("IdentityCertificate", identity.certificate) +
-                                    file("PrivateKey", identity.key)) +
-          element("Cryptographic", plugin("crypto", "crypto")) +
-          element("AccessControl",
-                  plugin("ac", "access_control") + file("PermissionsCA", identity.permissions_ca) +
-                      file("Governance", identity.governance) + file("Permissions", identity.permissions)));
-}
-
-/// Whole, so that CYCLONEDDS_URI is not asked: a foreign setting must not move the arm's bus.
-std::string configuration(const NodeOptions& options, const Interface& interface) {
-  const auto peers = unicast_peers(options, interface);
-  std::string list;
-  for (const std::string& peer : peers) list += "<Peer Address=\"" + peer + "\"/>";
-  const std::string general =
-      element("Interfaces", "<NetworkInterface address=\"" + interface.address + "\"/>") +
-      element("AllowMulticast", peers.empty() ? "spdp" : "false");
-  // Cyclone tries indices below the maximum.
-  const std::string discovery = element("ParticipantIndex", "auto") +
-                                element("MaxAutoParticipantIndex", std::to_string(kMaxParticipantIndex + 1)) +
-                                element("LeaseDuration", kLease) + element("SPDPInterval", kAnnouncement) +
-                                element("Peers", list);
-  const std::string secured =
-      options.security.empty() ? "" : security(find_identity(options.security).value());
-  // A writer waits for slow readers above this mark; keep-last already bounds what it holds.
-  const std::string internal = element("Watermarks", element("WhcHigh", "1GB"));
-  return element("CycloneDDS",
-                 element("Domain", element("General", general) + element("Discovery", discovery) +
-                                       element("Internal", internal) + secured));
-}
-
 /// One domain of this process, deleted with its last node.
 class Domain {
  public:
@@ -110,7 +61,7 @@ class Domain {
     static std::mutex mutex;
     static std::map<std::uint32_t, std::weak_ptr<Domain>> domains;
     std::lock_guard lock(mutex);
-    const std::string wanted = configuration(options, interface);
+    const std::string wanted = cyclone::configuration(options, interface);
     if (auto domain = domains[options.domain].lock()) {
       if (domain->configuration_ == wanted) return domain;
       return Problem{"domain", "= " + std::to_string(options.domain) +
@@ -331,17 +282,18 @@ class CycloneNode final : public Node {
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
     Events& events = make_events(topic, true);
-    const dds_entity_t made =
-        dds_create_writer(participant_, topic_for(topic),
-                          qos_for(topic, true, depth_of(topic.delivery), true).get(), listener_for(events).get());
+    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic),
+                                                qos_for(topic, true, depth_of(topic.delivery), true).get(),
+                                                listener_for(events).get());
     return std::make_unique<CycloneWriter>(topic, checked(made, "writer", topic), events);
   }
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     Events& events = make_events(topic, false);
     if (depth <= 0) depth = depth_of(topic.delivery);
-    const dds_entity_t made = dds_create_reader(
-        participant_, topic_for(topic), qos_for(topic, false, depth, ask == Ask::promises).get(), listener_for(events).get());
+    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic),
+                                                qos_for(topic, false, depth, ask == Ask::promises).get(),
+                                                listener_for(events).get());
     return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events);
   }
 

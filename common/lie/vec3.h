@@ -113,19 +113,16 @@ template <class S>
 [[gnu::always_inline]] inline Sym3<S> twice_symmetric(const Mat3<S>& W) {
   return {W.x.x + W.x.x, W.y.y + W.y.y, W.z.z + W.z.z, W.y.x + W.x.y, W.z.x + W.x.z, W.z.y + W.y.z};
 }
-/// M - s a a^T.
+/// M - a b^T where a b^T is symmetric.
 template <class S>
-[[gnu::always_inline]] inline Sym3<S> minus_outer(const Sym3<S>& M, const S& s, const Vec3<S>& a) {
-  const Vec3<S> b = s * a;
-  return {M.xx - b.x * a.x, M.yy - b.y * a.y, M.zz - b.z * a.z,
-          M.xy - b.x * a.y, M.xz - b.x * a.z, M.yz - b.y * a.z};
+[[gnu::always_inline]] inline Sym3<S> minus_outer(const Sym3<S>& M, const Vec3<S>& a, const Vec3<S>& b) {
+  return {M.xx - a.x * b.x, M.yy - a.y * b.y, M.zz - a.z * b.z,
+          M.xy - a.x * b.y, M.xz - a.x * b.z, M.yz - a.y * b.z};
 }
-/// M - s a b^T.
+/// M - a b^T.
 template <class S>
-[[gnu::always_inline]] inline Mat3<S> minus_outer(const Mat3<S>& M, const S& s, const Vec3<S>& a,
-                                                  const Vec3<S>& b) {
-  const Vec3<S> c = s * a;
-  return {M.x - b.x * c, M.y - b.y * c, M.z - b.z * c};
+[[gnu::always_inline]] inline Mat3<S> minus_outer(const Mat3<S>& M, const Vec3<S>& a, const Vec3<S>& b) {
+  return {M.x - b.x * a, M.y - b.y * a, M.z - b.z * a};
 }
 /// R M R^T for symmetric M.
 template <class A, class B>

@@ -1,5 +1,6 @@
 #include "common/rbd/axis_chain.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace hamel::rbd {
@@ -54,6 +55,8 @@ void AxisChain::assign(const model::Chain& chain) noexcept {
     a.mass = body.mass_kg;
     a.h = lie::vec3(body.mass_kg * c);
     a.I_o = lie::sym3(about_com + body.mass_kg * shift);
+    a.moment_size = std::abs(a.h.x) + std::abs(a.h.y) + std::abs(a.h.z);
+    a.inertia_size = std::max({a.I_o.xx, a.I_o.yy, a.I_o.zz});
     a.damping = joint.damping;
     a.armature = joint.armature;
     a.lower = joint.limits.lower;

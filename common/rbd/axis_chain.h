@@ -19,6 +19,8 @@ struct JointNumbers {
   double armature = 0;          ///< [kg m^2 or kg]
   double outer_mass = 0;        ///< of this link and all beyond it [kg]
   double weight = 0;            ///< bound of |gravity torque| at this joint [N m or N]
+  double moment_size = 0;       ///< sum of |mass times centre of mass| by components [kg m]
+  double inertia_size = 0;      ///< largest moment of inertia about the frame's axes [kg m^2]
   double lower = 0, upper = 0;  ///< joint limits, +-infinity where there are none
   bool prismatic = false;
 };

@@ -210,12 +210,11 @@ template <class S>
   return {k.sign * I.J, k.sign * I.H};
 }
 template <class S>
-[[gnu::always_inline]] inline PlanarArticulated<S> deflate(const PlanarArticulated<S>& I, const Half3<S>& U,
-                                                           const S& D_inv) {
-  const Half3<S> u = D_inv * U;
-  return {I.J - u.a * U.a,
-          {I.H.x - u.a * U.l.x, I.H.y - u.a * U.l.y},
-          {I.M.xx - u.l.x * U.l.x, I.M.yy - u.l.y * U.l.y, I.M.xy - u.l.x * U.l.y}};
+[[gnu::always_inline]] inline PlanarArticulated<S> deflate(const PlanarArticulated<S>& I, const Half3<S>& W,
+                                                           const Half3<S>& U) {
+  return {I.J - W.a * U.a,
+          {I.H.x - W.a * U.l.x, I.H.y - W.a * U.l.y},
+          {I.M.xx - W.l.x * U.l.x, I.M.yy - W.l.y * U.l.y, I.M.xy - W.l.x * U.l.y}};
 }
 /// The origin moves by -p.  With c = e_3 x p: H_P = H + M c, J_P = J + c . (H + H_P).
 template <class S>

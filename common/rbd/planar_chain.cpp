@@ -1,5 +1,6 @@
 #include "common/rbd/planar_chain.h"
 
+#include <cmath>
 #include <limits>
 
 namespace hamel::rbd {
@@ -68,6 +69,8 @@ void PlanarChain::assign(const model::Chain& chain) noexcept {
     k.axis = in_plane(axis);
     k.I_o = R_EB.row(2) * body.about_com_kgm2 * R_EB.row(2).transpose();
     k.I_o += body.mass_kg * (c.x() * c.x() + c.y() * c.y());
+    k.moment_size = std::abs(k.h.x) + std::abs(k.h.y);
+    k.inertia_size = k.I_o;
     k.sign = axis.z() < 0 ? -1 : 1;
     potential_offset -= body.mass_kg * g.z() * (p.z() + c.z());
     p_parent = p;

@@ -202,11 +202,11 @@ template <class S>
   if (k.prismatic) return {I.H.z, {I.M.xz, I.M.yz, I.M.zz}};
   return {{I.J.xz, I.J.yz, I.J.zz}, {I.H.x.z, I.H.y.z, I.H.z.z}};
 }
-/// I^a = I^A - U U^T / D.
+/// I^a = I^A - W U^T, W = U / D.
 template <class S>
-[[gnu::always_inline]] inline Articulated<S> deflate(const Articulated<S>& I, const Half6<S>& U,
-                                                     const S& D_inv) {
-  return {minus_outer(I.J, D_inv, U.a), minus_outer(I.M, D_inv, U.l), minus_outer(I.H, D_inv, U.a, U.l)};
+[[gnu::always_inline]] inline Articulated<S> deflate(const Articulated<S>& I, const Half6<S>& W,
+                                                     const Half6<S>& U) {
+  return {minus_outer(I.J, W.a, U.a), minus_outer(I.M, W.l, U.l), minus_outer(I.H, W.a, U.l)};
 }
 /// X^T I X: the inertia seen from the parent.  With H' = R H R^T, M' = R M R^T and K = H' + hat(p) M' / 2:
 /// H_P = H' + hat(p) M', J_P = R J R^T + W + W^T with W = hat(p) K^T.

@@ -12,8 +12,8 @@ namespace hamel::rbd {
 /// What one joint keeps of the articulated-body factorisation.
 template <class G, class S>
 struct Factor {
-  typename G::template Motion<S> U;  ///< I^A A
-  S D_inv{};                         ///< 1 / (A^T I^A A + armature + extra)
+  typename G::template Motion<S> W;  ///< I^A A / D, D = A^T I^A A + armature + extra
+  S D_inv{};                         ///< 1 / D
 };
 template <class S>
 using JointFactor = Factor<SE3, S>;
@@ -27,11 +27,12 @@ template <class G, class S>
   for (int i = chain.n(); i-- > 0;) {
     const auto& k = chain[i];
     add_rigid(k, X[i], I);
-    f[i].U = joint_column(k, X[i], I);
-    S D = along(k, X[i], f[i].U) + k.armature;
+    const auto U = joint_column(k, X[i], I);
+    S D = along(k, X[i], U) + k.armature;
     if (extra) D = D + extra[i];
     f[i].D_inv = 1.0 / D;
-    if (i > 0) I = to_parent(X[i], deflate(I, f[i].U, f[i].D_inv));
+    f[i].W = f[i].D_inv * U;
+    if (i > 0) I = to_parent(X[i], deflate(I, f[i].W, U));
   }
 }
 /// x = (M + diag(extra))^-1 (b - A^T W) from the factorisation, O(n), where W_i is the sum of the wrenches
@@ -45,14 +46,15 @@ template <class G, class S>
   for (int i = chain.n(); i-- > 0;) {
     const auto& k = chain[i];
     if (wrench) p = p + wrench[i];
-    u[i] = (b[i] - along(k, X[i], p)) * f[i].D_inv;
-    if (i > 0) p = to_parent(X[i], p + u[i] * f[i].U);
+    const S y = b[i] - along(k, X[i], p);
+    u[i] = y * f[i].D_inv;
+    if (i > 0) p = to_parent(X[i], p + y * f[i].W);
   }
   typename G::template Motion<S> a{};
   for (int i = 0; i < chain.n(); ++i) {
     const auto& k = chain[i];
     if (i > 0) a = to_child(X[i], a);
-    x[i] = u[i] - f[i].D_inv * dot(f[i].U, a);
+    x[i] = u[i] - dot(f[i].W, a);
     add_along(k, X[i], a, x[i]);
   }
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
@@ -20,7 +21,8 @@ void add_bus_options(CLI::App& app, BusOptions& o) {
       ->allow_extra_args(false);
   app.add_option("--discovery-server", o.discovery_server, "of Fast DDS, instead of peers and multicast")
       ->type_name("ADDRESS:PORT");
-  app.add_option("--security", o.security, "folder of an identity: authenticate and encrypt")
+  app.add_option("--security", o.security,
+                 "folder of identities (deploy/security/make), or of one: authenticate and encrypt")
       ->type_name("DIR");
 }
 
@@ -92,6 +94,19 @@ scene::Pace pace(const RunOptions& o, scene::Pace otherwise) {
   return otherwise;
 }
 
+namespace {
+
+/// A folder of one identity as it is; of one of several (deploy/security/make) that of this program.
+std::string identity_of(const std::string& folder, const std::string& name) {
+  const std::filesystem::path at = folder;
+  if (folder.empty() || std::filesystem::exists(at / "cert.pem")) return folder;
+  for (const char* service : {"dynamics", "planner", "perception"})
+    if (name == std::string("hamel-") + service) return (at / service).string();
+  return (at / "client").string();
+}
+
+}  // namespace
+
 Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const std::string& scene_vendor,
                                                       const std::string& name) {
   const std::string asked = !o.vendor.empty() ? o.vendor : scene_vendor;
@@ -106,7 +121,7 @@ Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const
   n.interface_name = o.interface_name;
   n.peers = o.peers;
   n.discovery_server = o.discovery_server;
-  n.security = o.security;
+  n.security = identity_of(o.security, name);
   n.name = name;
   n.log = [](const std::string& sentence) { spdlog::warn("{}", sentence); };
   return bus::open(n);

@@ -24,35 +24,12 @@ using scene::Tier;
 constexpr int kJoints[] = {3, 7, 30, 100, 300, 1000};
 constexpr double kEnd_s = 1;  // steps begin again after so much simulated time
 
-/// A spatial arm that hangs and swings: 3 m long, or links of 0.1 m where that is longer.
-model::ChainSpec arm_spec(int n) {
-  const double length_m = std::max(3.0 / n, 0.1);
-  model::ChainSpec spec;
-  spec.name = "arm";
-  spec.gravity_W_mps2 = {9.81, 0, 0};
-  for (int i = 0; i < n; ++i) {
-    model::Joint joint;
-    joint.X_PJ.p = {i > 0 ? length_m : 0.0, 0, 0};
-    joint.axis = i % 3 == 0   ? Eigen::Vector3d::UnitZ()
-                 : i % 3 == 1 ? Eigen::Vector3d::UnitY()
-                              : Eigen::Vector3d(0.6, 0, 0.8);
-    model::Link link;
-    link.inertia.mass_kg = 3 * length_m;
-    link.inertia.com_m = {0.5 * length_m, 0.01, 0};
-    const double across = link.inertia.mass_kg * (0.05 * 0.05 + length_m * length_m / 12);
-    link.inertia.about_com_kgm2 = Eigen::Vector3d(link.inertia.mass_kg * 0.003, across, across).asDiagonal();
-    spec.joints.push_back(joint);
-    spec.links.push_back(link);
-  }
-  return spec;
-}
-
 struct Given {
   VectorXd q, qd, tau;
 };
 
 struct Arm {
-  explicit Arm(int joints) : n(joints), chain(test::checked(arm_spec(joints))), states{} {
+  explicit Arm(int joints) : n(joints), chain(test::checked(test::hanging(joints))), states{} {
     for (Given& s : states)
       s = {rng.vector(n, std::min(0.1, 0.7 / n)), rng.vector(n, 0.5), rng.vector(n, 0.5)};
   }
@@ -87,10 +64,10 @@ void our_inverse(benchmark::State& state, int n) {
   }
 }
 
-void our_step(benchmark::State& state, int n, Options options) {
-  Arm arm(n);
-  dynamics::Integrator integrator(arm.chain, options);
-  const dynamics::State begin = integrator.start(arm.next().q, VectorXd::Zero(n));
+void step(benchmark::State& state, const model::Chain& chain, const VectorXd& q, const Options& options) {
+  const int n = chain.n();
+  dynamics::Integrator integrator(chain, options);
+  const dynamics::State begin = integrator.start(q, VectorXd::Zero(n));
   const VectorXd tau = VectorXd::Zero(n);
   dynamics::State s = begin;
   double evaluations = 0, steps = 0;
@@ -101,6 +78,16 @@ void our_step(benchmark::State& state, int n, Options options) {
     evaluations += report.evaluations, ++steps;
   }
   state.counters["evaluations"] = evaluations / steps;
+}
+
+void our_step(benchmark::State& state, int n, const Options& options) {
+  Arm arm(n);
+  step(state, arm.chain, arm.next().q, options);
+}
+
+/// A planar arm of links of 0.1 m that falls: on SE(2), or as any arm.
+void planar_step(benchmark::State& state, int n, const Options& options) {
+  step(state, test::checked(test::planar(n, 1, 0.1, 0.01)), VectorXd::Zero(n), options);
 }
 
 void peer_forward(benchmark::State& state, int n, const peers::Maker& maker) {
@@ -157,6 +144,7 @@ void add_ours(int n) {
   benchmark::RegisterBenchmark(title("inverse", "hamel", n).c_str(), our_inverse, n);
   const std::pair<const char*, Options> tiers[] = {
       {"hamel midpoint", {.tier = Tier::midpoint}},
+      {"hamel midpoint feedback", {.tier = Tier::midpoint, .root = Root::feedback}},
       {"hamel midpoint newton", {.tier = Tier::midpoint, .root = Root::newton}},
       {"hamel gauss-4", {.tier = Tier::gauss, .stages = 4}},
       {"hamel rk4", {.tier = Tier::rk4}},
@@ -165,6 +153,13 @@ void add_ours(int n) {
     options.dt_s = 1e-3;
     benchmark::RegisterBenchmark(title("step 1 ms", name, n).c_str(), our_step, n, options);
   }
+}
+
+void add_planar(int n) {
+  for (const scene::Space space : {scene::Space::automatic, scene::Space::se3})
+    benchmark::RegisterBenchmark(
+        title("planar step 1 ms", space == scene::Space::se3 ? "hamel SE(3)" : "hamel SE(2)", n).c_str(),
+        planar_step, n, Options{.dt_s = 1e-3, .space = space});
 }
 
 void add_peer(const peers::Maker& maker, int n) {
@@ -187,6 +182,7 @@ int main(int argc, char** argv) {
     hamel::add_ours(n);
     for (const auto& maker : hamel::peers::makers()) hamel::add_peer(maker, n);
   }
+  for (const int n : {3, 4, 7, 30}) hamel::add_planar(n);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   benchmark::RunSpecifiedBenchmarks();

@@ -102,7 +102,7 @@ inline dynamics::Options options(Bytes& in) {
   o.dt_s = in.positive(1, 7);
   o.alpha = in.number(1);
   o.stages = in.upto(9);
-  o.root = static_cast<scene::Root>(in.upto(1));
+  o.root = static_cast<scene::Root>(in.upto(2));
   o.start = static_cast<scene::Start>(in.upto(1));
   if (in.upto(1) == 0) o.tolerance_Nm = in.positive(1, 14);
   o.tolerance_rel = in.positive(1e-2, 12);

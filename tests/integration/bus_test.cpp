@@ -310,7 +310,8 @@ TEST_P(Bus, AKeyThatIsDisposedIsGoneForLateReaders) {
 TEST_P(Bus, BrokenPromisesAreCounted) {
   if (GetParam().from == Vendor::inproc) return;  // a writer within the process needs no watching
   const auto a = from(15), b = to(15);
-  const auto reader = b->reader(topics::kCommand, 0, bus::Ask::promises), lenient = b->reader(topics::kCommand);
+  const auto reader = b->reader(topics::kCommand, 0, bus::Ask::promises),
+             lenient = b->reader(topics::kCommand);
   auto node = open(GetParam().from, GetParam().domain + 15);
   const auto writer = node->writer(topics::kCommand);
   Payload p;

@@ -147,13 +147,15 @@ TEST(SceneText, EnumerationsHaveTheNamesOfTheOptions) {
     const auto v = static_cast<scene::Tier>(i);
     EXPECT_EQ(with(std::string("dynamics.tier=") + to_string(v)).dynamics.tier, v);
   }
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 3; ++i) {
     const auto root = static_cast<scene::Root>(i);
+    EXPECT_EQ(with(std::string("dynamics.root=") + to_string(root)).dynamics.root, root);
+  }
+  for (int i = 0; i < 2; ++i) {
     const auto start = static_cast<scene::Start>(i);
     const auto space = static_cast<scene::Space>(i);
     const auto pairs = static_cast<scene::PairPolicy>(i);
     const auto stop = static_cast<scene::StopRule>(i);
-    EXPECT_EQ(with(std::string("dynamics.root=") + to_string(root)).dynamics.root, root);
     EXPECT_EQ(with(std::string("dynamics.start=") + to_string(start)).dynamics.start, start);
     EXPECT_EQ(with(std::string("dynamics.space=") + to_string(space)).dynamics.space, space);
     EXPECT_EQ(with(std::string("planner.pairs=") + to_string(pairs)).planner.pairs, pairs);

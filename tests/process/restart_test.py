@@ -5,9 +5,11 @@ Six blows a run; with HAMEL_SOAK=1 fifty, over both scenes and with the vendors 
 
 import csv
 import io
+import json
 import os
 import random
 import signal
+import subprocess
 import tempfile
 import time
 import unittest
@@ -68,7 +70,7 @@ class Restart(unittest.TestCase):
         random_ = random.Random(seed)
         with tempfile.TemporaryDirectory() as folder:
             recording = os.path.join(folder, "run.mcap")
-            with Up(scene(name), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 12 + 1.6 * count,
+            with Up(scene(name), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 9 + 1.5 * count,
                     "--domain", domain, "--record", recording, *extra) as up:
                 up.child("dynamics")
                 time.sleep(1.5)
@@ -108,6 +110,62 @@ class Restart(unittest.TestCase):
     @unittest.skipUnless(SOAK, "only with HAMEL_SOAK=1")
     def test_panda_with_vendors_mixed(self):
         self.blows("panda_person", 4, 73, 50, MIXED)
+
+
+class Successor(unittest.TestCase):
+    """The planner comes back as somebody else: another vendor's, the same process number, after it ended by itself."""
+
+    def drives(self, domain, before):
+        """Whether a fresh command reaches the arm, whoever sends it."""
+        end = time.monotonic() + 30
+        while time.monotonic() < end:
+            code, out, err = hamel("topic", "echo", "state", "--count", 1, "--json", "--domain", domain)
+            self.assertEqual(code, 0, err)
+            state = json.loads(out)
+            if state["validity"] == 0 and state["step"] > before + 500:
+                return state["step"]
+        self.fail(f"the arm is not driven again: {state}")
+
+    def follows(self, domain, first, second):
+        """Each: prefix of the command line and options of a planner."""
+        name, method = scene("four_link_avoid"), ["--set", "planner.method=gyro"]
+        with tempfile.TemporaryDirectory() as folder:
+            start = lambda service, prefix, options: subprocess.Popen(
+                [*prefix, BIN / f"hamel-{service}", name, *method, "--domain", str(domain), *options], stderr=subprocess.DEVNULL)
+            others = [start("perception", [], []), start("dynamics", [], [])]
+            planner = None
+            try:
+                step = 0
+                for prefix, options in (first, second, first):
+                    planner = start("planner", prefix, ["--state-dir", folder, *options])
+                    step = self.drives(domain, step)
+                    planner.kill()
+                    planner.wait(20)
+            finally:
+                for p in [*others, planner]:
+                    p.kill()
+                    p.wait(20)
+
+    def test_over_another_vendor(self):
+        self.follows(83, ([], ["--bus", "cyclonedds"]), ([], ["--bus", "fastdds"]))
+
+    def test_with_the_same_process_number(self):
+        unshare = ["unshare", "-Urpf", "--kill-child"]
+        if subprocess.run([*unshare, "true"], capture_output=True).returncode:
+            self.skipTest("no privilege for a name space of process numbers")
+        for i, vendor in enumerate(("cyclonedds", "fastdds")):
+            with self.subTest(vendor):
+                self.follows(84 + i, (unshare, ["--bus", vendor]), (unshare, ["--bus", vendor]))
+
+    def test_after_it_ended_by_itself(self):
+        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--duration", 25, "--domain", 86) as up:
+            first = up.child("planner")
+            up.child("dynamics")
+            time.sleep(1)
+            os.kill(first, signal.SIGTERM)
+            code, o, err = up.end()
+        self.assertIn("planner died (exit code 0)", err)
+        self.assertEqual((code, o["outcome"]), (0, "REACHED"), err)
 
 
 class Lockstep(unittest.TestCase):
@@ -152,7 +210,7 @@ class Alone(unittest.TestCase):
         self.assertEqual(o["outcome"], "REACHED", err)
 
     def test_a_second_planner_is_refused_and_named_and_a_stronger_one_takes_over(self):
-        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 20,
+        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 14,
                 "--domain", 79) as up:
             up.child("dynamics")
             for strength in ("0", "5"):
@@ -195,7 +253,6 @@ class Leftovers(unittest.TestCase):
         self.assertEqual(things() - before, set())
 
     def test_a_full_disk_under_stderr_aborts_nobody(self):
-        import subprocess
         with open("/dev/full", "w") as full:
             for program in ("hamel-dynamics", "hamel-planner", "hamel-perception", "hamel"):
                 args = [BIN / program] + (["up"] if program == "hamel" else []) + ["/nowhere.textproto"]
@@ -204,7 +261,6 @@ class Leftovers(unittest.TestCase):
 
 def subprocess_of(service, *args):
     import contextlib
-    import subprocess
 
     @contextlib.contextmanager
     def running():

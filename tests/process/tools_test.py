@@ -4,6 +4,7 @@
 import json
 import os
 import pathlib
+import shutil
 import socket
 import subprocess
 import tempfile
@@ -131,6 +132,36 @@ class Systemd(unittest.TestCase):
                 while b"STOPPING=1" not in said:
                     said.add(s.recv(100))
                 self.assertEqual(p.wait(10), 0)
+
+
+class Network(unittest.TestCase):
+    def test_two_hosts_on_one_cable(self):
+        for options in (["--bus", "cyclonedds"], ["--bus", "fastdds", "--no-multicast"]):
+            with self.subTest(options):
+                done = subprocess.run([ROOT / "deploy/netns/robots", *options], capture_output=True, text=True, timeout=100,
+                                      env=dict(os.environ, HAMEL_BIN=str(BIN)))
+                if done.returncode == 77:
+                    self.skipTest(done.stderr.strip())
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                self.assertIn("was steered from", done.stdout)
+
+    def test_a_discovery_server_brings_fast_dds_together_and_without_it_nobody_meets(self):
+        if not shutil.which("fast-discovery-server"):
+            self.skipTest("fast-discovery-server is not installed (fastdds-tools)")
+        up = [scene("four_link_avoid"), "--bus", "fastdds", "--discovery-server", "127.0.0.1:11877", "--domain", "97", "--lockstep",
+              "--duration", "0.5", "--set", "stop=at_duration"]
+        _, here, _ = hamel("run", *up[:1], *up[-5:], "--json")
+        server = subprocess.Popen(["fast-discovery-server", "-i", "0", "-l", "127.0.0.1", "-p", "11877"], stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL)
+        try:
+            _, there, err = hamel("up", *up, "--json")
+            self.assertEqual(json.loads(there)["trajectory_hash"], json.loads(here)["trajectory_hash"], err)
+        finally:
+            server.kill()
+            server.wait()
+        code, _, err = hamel("status", "--bus", "cyclonedds", "--discovery-server", "127.0.0.1:11877", "--domain", 97)
+        self.assertEqual(code, 2)
+        self.assertIn("Fast DDS", err)
 
 
 if __name__ == "__main__":

@@ -230,22 +230,6 @@ TEST(Prismatic, SlideFallsByTheBook) {
   EXPECT_NEAR(s.qd[0], 3 + (4. / 2 - 9.81), 1e-13);
 }
 
-TEST(Linear, EvaluationsDoNotGrowWithTheChain) {
-  for (const int n : {3, 30, 300, 1000}) {
-    model::ChainSpec spec = test::planar(n, 1.0 / n, 1.0 / n, 1e-2 / n);
-    const model::Chain chain = test::checked(spec);
-    Integrator integrator(chain, {.dt_s = 1e-4});
-    State s = integrator.start(VectorXd::Zero(n), VectorXd::Zero(n));
-    int worst = 0;
-    for (int k = 0; k < 20; ++k) {
-      const StepReport report = integrator.step(s, VectorXd::Zero(n));
-      ASSERT_TRUE(report.usable()) << n << " joints, step " << k;
-      worst = std::max(worst, report.evaluations);
-    }
-    EXPECT_LE(worst, 5) << n << " joints";
-  }
-}
-
 /// At joints that carry no torque the momentum stays zero as a sum of parts that cancel: rounding must be
 /// known by the parts.
 TEST(Start, ATorqueAtOneJointSetsARestingArmInMotion) {

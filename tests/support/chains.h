@@ -82,6 +82,29 @@ inline model::Chain paper_5_2() {
 /// Three slender rods of 1 m and 1 kg falling from horizontal: fast and chaotic.
 inline model::Chain fast_rods() { return checked(planar(3, 1, 1, 1.0 / 12)); }
 
+/// A spatial arm that hangs and swings: 3 m long, or links of 0.1 m where that is longer.
+inline model::ChainSpec hanging(int n) {
+  const double length_m = std::max(3.0 / n, 0.1);
+  model::ChainSpec spec;
+  spec.name = "arm";
+  spec.gravity_W_mps2 = {9.81, 0, 0};
+  for (int i = 0; i < n; ++i) {
+    model::Joint joint;
+    joint.X_PJ.p = {i > 0 ? length_m : 0.0, 0, 0};
+    joint.axis = i % 3 == 0   ? Eigen::Vector3d::UnitZ()
+                 : i % 3 == 1 ? Eigen::Vector3d::UnitY()
+                              : Eigen::Vector3d(0.6, 0, 0.8);
+    model::Link link;
+    link.inertia.mass_kg = 3 * length_m;
+    link.inertia.com_m = {0.5 * length_m, 0.01, 0};
+    const double across = link.inertia.mass_kg * (0.05 * 0.05 + length_m * length_m / 12);
+    link.inertia.about_com_kgm2 = Eigen::Vector3d(link.inertia.mass_kg * 0.003, across, across).asDiagonal();
+    spec.joints.push_back(joint);
+    spec.links.push_back(link);
+  }
+  return spec;
+}
+
 struct RandomChain {
   double prismatic = 0.2;  ///< share of prismatic joints
   double armature = 0.3;   ///< share of joints with armature

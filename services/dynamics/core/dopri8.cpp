@@ -96,29 +96,31 @@ Dopri8Step<G>::Dopri8Step(const typename G::Chain& chain, const Options& options
 /// is good.
 template <class G>
 double Dopri8Step<G>::try_step(double h, const Load<G>& load) noexcept {
-  const auto add = [&](const std::array<double, 12>& weights, int count, VectorXd& q, VectorXd& qd) {
+  const Eigen::Index n = q_.size();
+  const auto add = [&](const std::array<double, 12>& weights, int count, double* q, double* qd) {
     for (int j = 0; j < count; ++j) {
       const std::size_t s = static_cast<std::size_t>(j);
       if (weights[s] == 0) continue;
-      q += (h * weights[s]) * rate_[s];
-      qd += (h * weights[s]) * acceleration_[s];
+      const double w = h * weights[s], *rate = rate_[s].data(), *acceleration = acceleration_[s].data();
+      for (Eigen::Index k = 0; k < n; ++k) q[k] += w * rate[k], qd[k] += w * acceleration[k];
     }
   };
   for (int i = 1; i < Dop853::kStages; ++i) {
     const std::size_t s = static_cast<std::size_t>(i);
     q_new_ = q_, rate_[s] = qd_;
-    add(Dop853::a[s], i, q_new_, rate_[s]);
+    add(Dop853::a[s], i, q_new_.data(), rate_[s].data());
     power_[s] = field_(q_new_, rate_[s], load, acceleration_[s]);
   }
   q_new_ = q_, qd_new_ = qd_;
-  add(Dop853::b, Dop853::kStages, q_new_, qd_new_);
+  add(Dop853::b, Dop853::kStages, q_new_.data(), qd_new_.data());
   double sum5 = 0, sum3 = 0;
-  for (Eigen::Index k = 0; k < q_.size(); ++k) {
+  for (Eigen::Index k = 0; k < n; ++k) {
     double q5 = 0, q3 = 0, v5 = 0, v3 = 0;
     for (std::size_t s = 0; s < Dop853::kStages; ++s) {
-      q5 += Dop853::error5[s] * rate_[s][k], v5 += Dop853::error5[s] * acceleration_[s][k];
-      const double w3 = Dop853::b[s] - Dop853::error3[s];
-      q3 += w3 * rate_[s][k], v3 += w3 * acceleration_[s][k];
+      const double rate = rate_[s].data()[k], acceleration = acceleration_[s].data()[k];
+      const double w5 = Dop853::error5[s], w3 = Dop853::b[s] - Dop853::error3[s];
+      q5 += w5 * rate, v5 += w5 * acceleration;
+      q3 += w3 * rate, v3 += w3 * acceleration;
     }
     const double q_scale = tolerance_ * std::max({1.0, std::abs(q_[k]), std::abs(q_new_[k])});
     const double v_scale = tolerance_ * std::max({1.0, std::abs(qd_[k]), std::abs(qd_new_[k])});

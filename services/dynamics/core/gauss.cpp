@@ -33,15 +33,17 @@ GaussStep<G>::GaussStep(const Chain& chain, const Options& options, Lanes lanes)
       padded_(padded(options.stages)),
       a_(with_rows(method_.a, padded_)),
       kernel_(stage_kernel<G>(lanes)),
+      contraction_(chain.n()),
       x_{MatrixXd::Zero(padded_, chain.n()), MatrixXd::Zero(padded_, chain.n())},
       next_(x_),
       applied_(x_.V),
       inertia_(VectorXd::Zero(chain.n())),
       u_(inertia_),
       p_next_(inertia_),
-      scratch_(scratch_bytes<G>(chain.n()) + 64) {
+      scratch_(8 * lane_bytes<G>(chain.n()) + 64) {
   const auto start = reinterpret_cast<std::uintptr_t>(scratch_.data());
   job_.scratch = scratch_.data() + (64 - start % 64) % 64;
+  job_.lane_bytes = lane_bytes<G>(chain.n());
   job_.chain = &chain_;
   job_.stop_stiffness = options_.stop_stiffness;
   job_.stages = stages_, job_.padded = padded_;
@@ -82,22 +84,19 @@ void GaussStep<G>::guess(Stages& x) noexcept {
 
 template <class G>
 void GaussStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noexcept {
-  from_ = &from, load_ = &load, h_ = h, mismatch_ = 0;
+  from_ = &from, load_ = &load, h_ = h;
   for (int i = 0; i < chain_.n(); ++i) inertia_[i] = 1 / from.factor[at(i)].D_inv;
-  job_.load = &load, job_.tau = load.tau.data(), job_.h = h;
+  job_.load = &load, job_.tau = load.tau.data(), job_.h = h, job_.fresh = true;
   job_.q = from.q.data(), job_.p = from.p.data();
 }
 
-/// What follows from x is nearer to the root than x by the rate at which the mismatch falls: the residual is
-/// what it would be there.
 template <class G>
 Residual GaussStep<G>::evaluate(const Stages& x) noexcept {
   job_.V = x.V.data(), job_.F = x.F.data();
   job_.V_next = next_.V.data(), job_.F_next = next_.F.data();
   kernel_(job_);
-  const double rate = mismatch_ > 0 ? std::min(1.0, job_.relative / mismatch_) : 1;
-  mismatch_ = job_.relative;
-  return {job_.torque_Nm, job_.relative * rate};
+  job_.fresh = false;
+  return {job_.torque_Nm, job_.relative};
 }
 
 /// A joint's damping c meets its own inertia D: where x follows from F - c V, forces that oppose the change
@@ -138,20 +137,23 @@ template <class G>
 StepReport GaussStep<G>::advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept {
   begin(from, load, h);
   guess(x_);
-  StepReport report = find_root(*this, options_, x_);
+  contraction_ = Contraction(chain_.n());
+  StepReport report = find_root(*this, options_, contraction_, x_);
+  if (report.iterations < report.evaluations) correct(x_);  // what follows from x is nearer to the root
   report.evaluations *= stages_;
   if (!report.usable()) return report;
-  for (int i = 0; i < chain_.n(); ++i) {
-    double dq = 0, dp = 0;
+  const double *V = x_.V.data(), *F = x_.F.data(), *applied = applied_.data(), *b = method_.b.data();
+  for (int i = 0; i < chain_.n(); ++i, V += padded_, F += padded_, applied += padded_) {
+    double dq = 0, dp = 0, work = 0;
     for (int j = 0; j < stages_; ++j) {
-      const double V = next_.V(j, i), b = method_.b[j];
-      dq += b * V;
-      dp += b * next_.F(j, i);
-      report.work_J += h * b * applied_(j, i) * V;
+      dq += b[j] * V[j];
+      dp += b[j] * F[j];
+      work += b[j] * applied[j] * V[j];
     }
     u_[i] = from.q[i] + h * dq, p_next_[i] = from.p[i] + h * dp;
+    report.work_J += h * work;
   }
-  remember(next_, to);
+  remember(x_, to);
   to.place(chain_, u_);
   to.move_with_momentum(chain_, p_next_);
   return report;

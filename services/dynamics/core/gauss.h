@@ -8,10 +8,11 @@
 ///   V_i = M(Q_i)^-1 P_i,          F_i = dL/dq(Q_i, V_i) + tau - damping V_i + stops(Q_i)
 ///   q' = q + h sum b_i V_i,       p' = p + h sum b_i F_i
 /// where dL/dq_i = A_i^T (ad_{V_i}^T h_i + w_i), composite momentum and weight as in midpoint.h.
-/// Solved by fixed-point iteration (Anderson's acceleration saved 6 % of the iterations at most: left out)
-/// from the extrapolated polynomials of the last step; all stages of an iteration side by side in SIMD lanes
-/// (gauss_lanes.h); O(n) a stage.  Damping is taken implicitly in the iteration, joint by joint; where it
-/// takes a joint's momentum several times over in one step (h c / D = 3) the step is still divided.
+/// Solved by fixed-point iteration, rates before configurations (Anderson's acceleration of the plain one
+/// saved 6 % of its iterations at most: left out), from the extrapolated polynomials of the last step; all
+/// stages of an iteration side by side in SIMD lanes (gauss_lanes.h); O(n) a stage.  Damping is taken
+/// implicitly in the iteration, joint by joint; where it takes a joint's momentum several times over in one
+/// step (h c / D = 3) the step is still divided.
 
 #include <Eigen/Core>
 #include <vector>
@@ -56,7 +57,8 @@ class GaussStep final : public TierStep<G> {
   const StageKernel<G> kernel_;
   const Node<G>* from_ = nullptr;
   const Load<G>* load_ = nullptr;
-  double h_ = 0, mismatch_ = 0;
+  double h_ = 0;
+  Contraction contraction_;
   StageJob<G> job_;
   Stages x_, next_;
   MatrixXd applied_;

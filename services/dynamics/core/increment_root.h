@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,63 +12,70 @@
 
 namespace hamel::dynamics {
 
-/// The last increments, newest first, as they lie in State::history: [count, h, d_k (n), d_{k-1} (n), ...].
-/// They serve only steps of the same length h.
+/// The past of an iteration, as it lies in State::history:
+///   [count, h, rate, d, its backward differences of order 1 .. kDepth - 1 (n each)].
+/// It serves only steps of the same length h.
 class IncrementHistory {
  public:
   static constexpr int kDepth = 7;
-  static std::size_t size(int n) noexcept { return 2 + static_cast<std::size_t>(kDepth * n); }
+  static std::size_t size(int n) noexcept { return kHead + static_cast<std::size_t>(kDepth * n); }
 
-  explicit IncrementHistory(int n) : difference_(static_cast<std::size_t>(kDepth * n)) {}
-
-  /// First guess of d: h qd while there is no past, else the polynomial through the last increments as a sum
-  /// of backward differences, cut off where they stop falling: smooth motion gets a high order, rough motion
-  /// a low one.
+  /// First guess of the increment d: h qd while there is no past, else the polynomial through the last
+  /// increments as a sum of backward differences, cut off where they stop falling: smooth motion gets a high
+  /// order, rough motion a low one.
   template <class G>
-  void guess(const Node<G>& from, double h, VectorXd& d) noexcept {
+  static void guess(const Node<G>& from, double h, VectorXd& increment) noexcept {
     const std::vector<double>& s = from.history;
-    const Eigen::Index n = d.size();
+    const Eigen::Index n = increment.size();
+    const double* qd = from.qd.data();
+    double* d = increment.data();
     const int count = s[1] == h ? static_cast<int>(s[0]) : 0;
-    d = h * from.qd;
-    if (count == 0) return;
-    const double* last = s.data() + 2;
-    if (count == 1) {  // h qd lies between the two increments
-      for (Eigen::Index i = 0; i < n; ++i) d[i] = 2 * d[i] - last[i];
+    const double* difference = s.data() + kHead;
+    if (count < 2) {
+      for (Eigen::Index i = 0; i < n; ++i) d[i] = h * qd[i];
+      if (count == 0) return;
+      for (Eigen::Index i = 0; i < n; ++i) d[i] = 2 * d[i] - difference[i];  // h qd lies between the two
       return;
     }
-    // the newest differences lie in front: one flat subtraction an order
-    double* v = difference_.data();
-    std::copy_n(last, count * n, v);
-    std::copy_n(v, n, d.data());
-    double before = size_of(v, n);
-    for (Eigen::Index left = (count - 1) * n; left > 0; left -= n) {
-      for (Eigen::Index j = 0; j < left; ++j) v[j] -= v[j + n];
-      const double size = size_of(v, n);
-      if (size >= 0.5 * before) return;
-      for (Eigen::Index i = 0; i < n; ++i) d[i] += v[i];
-      before = size;
+    std::array<double, kDepth> size{};
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (int order = 0; order < kDepth; ++order) size[at(order)] += std::abs(difference[order * n + i]);
+    int orders = 1;
+    while (orders < count && size[at(orders)] < 0.5 * size[at(orders - 1)]) ++orders;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      double sum = 0;
+      for (int order = orders; order-- > 0;) sum += difference[order * n + i];
+      d[i] = sum;
     }
   }
-
-  /// Puts d in front of from's history and writes it to `to`.
+  /// Share of the residual that an update left when it was last seen; 0: not known.
   template <class G>
-  static void push(const Node<G>& from, double h, const VectorXd& d, Node<G>& to) noexcept {
+  static double rate(const Node<G>& from, double h) noexcept {
+    return from.history[1] == h ? from.history[2] : 0;
+  }
+  /// Puts the increment in front of from's history and writes it to `to`.
+  template <class G>
+  static void push(const Node<G>& from, double h, double rate, const VectorXd& increment,
+                   Node<G>& to) noexcept {
     const std::vector<double>& s = from.history;
-    const Eigen::Index n = d.size();
+    const Eigen::Index n = increment.size();
     const double count = s[1] == h ? s[0] : 0;
     to.history[0] = std::min<double>(count + 1, kDepth);
-    to.history[1] = h;
-    std::copy(s.begin() + 2, s.end() - n, to.history.begin() + 2 + n);
-    Eigen::Map<VectorXd>(to.history.data() + 2, n) = d;
+    to.history[1] = h, to.history[2] = rate;
+    const double *last = s.data() + kHead, *d = increment.data();
+    double* next = to.history.data() + kHead;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      double x = d[i];
+      for (int order = 0; order < kDepth; ++order) {
+        next[order * n + i] = x;
+        x -= last[order * n + i];
+      }
+    }
   }
 
  private:
-  static double size_of(const double* v, Eigen::Index n) noexcept {
-    double size = 0;
-    for (Eigen::Index i = 0; i < n; ++i) size += std::abs(v[i]);
-    return size;
-  }
-  std::vector<double> difference_;
+  static std::size_t at(int order) noexcept { return static_cast<std::size_t>(order); }
+  static constexpr std::size_t kHead = 3;
 };
 
 /// Turn bound of the tiers that find increments [rad].
@@ -79,47 +87,110 @@ struct Residual {
   double relative = 0;   ///< the same against the momenta and torques that make it up
 };
 
-/// Relative residual that counts as rounding: reached, the iteration stops.
+/// Relative residual that counts as rounding for a few links; sums along many links round more.
 inline constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
-/// Relative residual below which one look without progress means that rounding is reached ...
-inline constexpr double kFloor = 1e-12;
-/// ... and below which several in a row do: slow convergence is not stagnation.
+/// Relative residual below which an update that gains much less than others did means that rounding is
+/// reached: it left more than kIdle, and kWorse times what the best one left ...
+inline constexpr double kFloor = 1e-11;
+inline constexpr double kIdle = 0.3, kWorse = 4;
+/// ... and below which several updates in a row without progress do: slow convergence is not stagnation.
 inline constexpr double kHighFloor = 1e-9;
 inline constexpr int kPatience = 3;
 /// Growth over the first residual that means divergence.
 inline constexpr double kGrowth = 1e6;
 
+/// How fast an iteration converges: the largest share of the residual that an update left.  Parts of the
+/// error that fall slowly are not seen before the others are gone, so what past steps saw counts as well.
+class Contraction {
+ public:
+  /// For a chain of n joints; `rate`: what past steps saw, 0: nothing.
+  explicit Contraction(int n, double rate = 0)
+      : rounding_(kRounding * std::max(1.0, 0.125 * n)), rate_(rate), known_(rate > 0) {}
+  void see(double relative) noexcept {
+    if (last_ > 0 && (last_ > kClear * rounding_ || rate_ == 0)) {
+      known_ = known_ || seen_ > 0;
+      seen_ = std::max(seen_, relative / last_);
+      rate_ = std::max(rate_, seen_);
+    }
+    last_ = relative;
+  }
+  /// From now on updates are made by an exact Jacobian: what others left says nothing.
+  void sharpen() noexcept { rate_ = seen_ = 0, known_ = true, least_ = kLeastExact; }
+  /// 0: not known.
+  double rate() const noexcept { return rate_; }
+  /// The largest in this step; 0: none was seen.
+  double seen() const noexcept { return seen_; }
+  bool done() const noexcept { return last_ <= rounding_; }
+  /// One more update leaves nothing to see.
+  bool ends_next() const noexcept {
+    return known_ && rate_ > 0 && rate_ < 1 && last_ * std::max(rate_, least_) <= rounding_;
+  }
+  /// Updates still needed at this rate, `most` at most; 1 when it is not known.
+  int updates_left(int most) const noexcept {
+    if (rate_ == 0) return 1;
+    int updates = 0;
+    for (double r = last_; r > rounding_ && updates < most; ++updates) r *= rate_;
+    return updates;
+  }
+
+ private:
+  static constexpr double kClear = 100;  ///< a residual so much above rounding is known well
+  /// No update is trusted to leave less, for motion changes from step to step.
+  static constexpr double kLeast = 1e-3, kLeastExact = 1e-6;
+  double rounding_, rate_, seen_ = 0, last_ = 0, least_ = kLeast;
+  bool known_;
+};
+
 /// Updates the unknown until the equation holds.  Equation: Residual evaluate(x), void correct(x) (x -= J^-1
-/// r). The last call to evaluate() is at the x that is returned.
+/// r).  With the scaled tolerance the last update is not looked at when the one before it leaves no doubt:
+/// the last evaluation is then at an x that differs by less than a rounding error over `contraction`'s rate,
+/// and residual_Nm is what is expected.
 template <class Equation, class Unknown>
-StepReport find_root(Equation& equation, const Options& options, Unknown& x) noexcept {
+StepReport find_root(Equation& equation, const Options& options, Contraction& contraction,
+                     Unknown& x) noexcept {
   StepReport report;
-  double first = 0, best = std::numeric_limits<double>::infinity();
+  double first = 0, last = 0, best = std::numeric_limits<double>::infinity(), best_rate = 1;
   int since_best = 0;
   for (;;) {
     const Residual r = equation.evaluate(x);
     ++report.evaluations;
     report.residual_Nm = r.torque_Nm;
     if (!std::isfinite(r.torque_Nm) || !std::isfinite(r.relative)) return report;
-    if (options.tolerance_Nm > 0 ? r.torque_Nm < options.tolerance_Nm : r.relative <= kRounding) {
+    contraction.see(r.relative);
+    if (options.tolerance_Nm > 0 ? r.torque_Nm < options.tolerance_Nm : contraction.done()) {
       report.stop = Stop::converged;
       return report;
     }
+    if (report.evaluations == 1) {
+      first = r.relative;
+    } else {
+      const double rate = r.relative / last;
+      if (r.relative < kFloor && rate > kIdle && rate > kWorse * best_rate) {
+        report.stop = Stop::stagnated;
+        return report;
+      }
+      best_rate = std::min(best_rate, rate);
+    }
+    last = r.relative;
     since_best = r.relative < best ? 0 : since_best + 1;
-    if ((r.relative < kFloor && r.relative > 0.5 * best) ||
-        (r.relative < kHighFloor && since_best >= kPatience)) {
+    if (r.relative < kHighFloor && since_best >= kPatience) {
       report.stop = Stop::stagnated;
       return report;
     }
-    if (report.evaluations == 1) first = r.relative;
     if (r.relative > kGrowth * first) return report;
     if (report.iterations == options.max_iterations) {
       report.stop = Stop::budget_spent;
       return report;
     }
     best = std::min(best, r.relative);
+    const bool ends = !(options.tolerance_Nm > 0) && contraction.ends_next();
     equation.correct(x);
     ++report.iterations;
+    if (ends) {
+      report.residual_Nm *= std::min(1.0, contraction.rate());
+      report.stop = Stop::converged;
+      return report;
+    }
   }
 }
 

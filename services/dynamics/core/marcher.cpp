@@ -46,9 +46,8 @@ template <class G>
 bool Marcher<G>::acceptable(const State& s) const noexcept {
   const auto n = chain_.n();
   return s.q.size() == n && s.p.size() == n && s.qd.size() == n &&
-         s.history.size() == now_.history.size() + Ledger::kSize && s.q.allFinite() && s.p.allFinite() &&
-         s.qd.allFinite() &&
-         std::all_of(s.history.begin(), s.history.end(), [](double x) { return std::isfinite(x); });
+         s.history.size() == now_.history.size() + Ledger::kSize && all_finite(s.q) && all_finite(s.p) &&
+         all_finite(s.qd) && all_finite(s.history);
 }
 
 /// Makes `now` the node of `s`.  A node computed by the last step is kept: place() and move_...() are
@@ -82,11 +81,13 @@ void Marcher<G>::store(State& s) const noexcept {
 template <class G>
 bool Marcher<G>::sane(const StepReport& report, const Load<G>& load, double h) const noexcept {
   if (!next_.finite()) return false;
+  const double bound = tier_->turn_bound(), *q = now_.q.data(), *qd = now_.qd.data(),
+               *q_next = next_.q.data(), *tau = load.tau.data();
   double work = std::abs(report.work_J);
   for (int i = 0; i < chain_.n(); ++i) {
-    const double d = next_.q[i] - now_.q[i];
-    if (!chain_[i].prismatic && std::abs(d - h * now_.qd[i]) > tier_->turn_bound()) return false;
-    work += std::abs(load.tau[i] * d);
+    const double d = q_next[i] - q[i];
+    if (!chain_[i].prismatic && std::abs(d - h * qd[i]) > bound) return false;
+    work += std::abs(tau[i] * d);
   }
   const double in_play = now_.energy_J - now_.potential_J + work + chain_.energy_scale + kNothing;
   const double made_up = next_.energy_J - now_.energy_J - report.work_J;

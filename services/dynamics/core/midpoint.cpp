@@ -12,7 +12,25 @@ namespace {
 /// mass matrix is factorised with them, once more a step.
 constexpr double kExtraShare = 0.02;
 
+/// Relative residual above which what a residual is measured by is not known yet.
+constexpr double kFarOff = 1e-3;
+
+/// A Jacobian that leaves more of the residual is made anew.
+constexpr double kStale = 0.01;
+/// Updates by feedback that cost more than the exact Jacobian and the updates it needs.
+constexpr int kWorthNewton = 4;
+/// A step in which feedback gains less a time is too long for the motion, whoever finds its root: it is for
+/// feedback to fail, and the step to be divided.
+constexpr double kResolved = 0.25;
+/// After some steps by Newton feedback is tried again; a rate not seen for some steps is looked at again.
+constexpr double kForget = 0.9, kAge = 1.25;
+
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Torque of damping and stops.
+double resistance(const rbd::JointNumbers& k, double rate, double stiffness, double q) {
+  return (stiffness > 0 ? stop_torque(k, stiffness, q) : 0) - k.damping * rate;
+}
 
 }  // namespace
 
@@ -20,10 +38,11 @@ template <class G>
 MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
     : chain_(chain),
       options_(options),
-      history_(chain.n()),
+      contraction_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
       p_next_(d_),
+      scale_inv_(d_),
       extra_(d_),
       u_(d_),
       X_(at(chain.n())),
@@ -35,44 +54,52 @@ MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
       g_(at(chain.n())),
       moment_(at(chain.n())),
       push_(chain.n()),
-      newton_(chain) {}
+      newton_(chain) {
+  brakes_ = options.stop_stiffness > 0;
+  for (const auto& k : chain.links) brakes_ = brakes_ || k.damping != 0;
+}
 
 template <class G>
 void MidpointStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noexcept {
-  from_ = &from, load_ = &load, h_ = h;
-  linearised_ = false;
+  from_ = &from, load_ = &load, h_ = h, rate_ = 1 / h;
+  linearised_ = false, rescale_ = true, feedback_rate_ = 0;
 }
 
 template <class G>
 StepReport MidpointStep<G>::advance(const Node<G>& from, const Load<G>& load, double h,
                                     Node<G>& to) noexcept {
   begin(from, load, h);
-  history_.guess(from, h, d_);
-  if (options_.root == Root::feedback) choose_factorisation(d_);
+  contraction_ = Contraction(chain_.n(), IncrementHistory::rate(from, h));
+  IncrementHistory::guess(from, h, d_);
+  if (options_.root != Root::newton) choose_factorisation(d_);
   if (options_.start == Start::previous) d_.setZero();
-  StepReport report = find_root(*this, options_, d_);
+  StepReport report = find_root(*this, options_, contraction_, d_);
   if (!report.usable()) return report;
-  for (int i = 0; i < chain_.n(); ++i) report.work_J += force(i, d_[i]) * d_[i];
-  IncrementHistory::push(from, h, d_, to);
+  report.work_J = work(d_.data());
+  IncrementHistory::push(from, h, remembered_rate(), d_, to);
   u_ = from.q + d_;
   to.place(chain_, u_);
   to.move_with_momentum(chain_, p_next_);
   return report;
 }
 
-/// Joint torque over the step: commanded, damping by the mean rate, wrenches and stops at the midpoint.
+/// Of what acts on the joints, over the step.
 template <class G>
-[[gnu::always_inline]] inline double MidpointStep<G>::force(int i, double d) const noexcept {
-  const auto& k = chain_[i];
-  double f = load_->tau[i] + push_[i] - k.damping * d / h_;
-  if (options_.stop_stiffness > 0) f += stop_torque(k, options_.stop_stiffness, from_->q[i] + 0.5 * d);
-  return f;
+double MidpointStep<G>::work(const double* d) const noexcept {
+  const double *q = from_->q.data(), *tau = load_->tau.data(), *pushed = push_.data();
+  double sum = 0;
+  for (int i = 0; i < chain_.n(); ++i)
+    sum += (tau[i] + pushed[i] +
+            resistance(chain_[i], d[i] * rate_, options_.stop_stiffness, q[i] + 0.5 * d[i])) *
+           d[i];
+  return sum;
 }
 
 /// The Jacobian is M/h plus, on the diagonal, damping/2 and h/4 times the stops' slope.
 template <class G>
 void MidpointStep<G>::choose_factorisation(const VectorXd& d) noexcept {
   frames_ = &from_->X, factor_ = &from_->factor;
+  if (!brakes_) return;
   bool large = false;
   for (int i = 0; i < chain_.n(); ++i) {
     const double slope = stop_slope(chain_[i], options_.stop_stiffness, from_->q[i] + 0.5 * d[i]);
@@ -87,12 +114,12 @@ void MidpointStep<G>::choose_factorisation(const VectorXd& d) noexcept {
 }
 
 template <class G>
-void MidpointStep<G>::forward(const VectorXd& d) noexcept {
-  u_ = from_->q + 0.5 * d;
+void MidpointStep<G>::forward(const double* d) noexcept {
+  u_ = from_->q + 0.5 * Eigen::Map<const VectorXd>(d, chain_.n());
   rbd::place(chain_, u_.data(), X_.data());
   typename G::template Motion<double> V;
   auto g = chain_.gravity_W;
-  const double rate = 1 / h_;
+  const double rate = rate_;
   for (int i = 0; i < chain_.n(); ++i) {
     const auto& X = X_[at(i)];
     V = to_child(X, V);
@@ -103,73 +130,94 @@ void MidpointStep<G>::forward(const VectorXd& d) noexcept {
   }
 }
 
+/// The torque over the step: commanded, damping by the mean rate, wrenches and stops at the midpoint.
 template <class G>
-Residual MidpointStep<G>::backward(const VectorXd& d) noexcept {
+Residual MidpointStep<G>::backward(const double* d) noexcept {
   typename G::template Motion<double> H;  // composite momentum
   typename G::template Direction<double>
       moment;  // composite first moment of mass: w_i = (moment x g, mass g)
   MomentumParts parts;
-  const double rate = 1 / h_, half = 0.5 * h_;
-  double largest = 0, poison = 0, worst_size = 0, worst_scale = 1;  // of |r|; the worst by its scale
+  // plain pointers and numbers of its own: this is where the time goes
+  const double h = h_, half = 0.5 * h_, rate = rate_, stiffness = options_.stop_stiffness;
+  const double quiet = kQuiet * chain_.energy_scale;
+  const double *q = from_->q.data(), *p = from_->p.data(), *tau = load_->tau.data(), *pushed = push_.data();
+  double *r = r_.data(), *p_next = p_next_.data(), *scale_inv = scale_inv_.data();
+  const bool rescale = rescale_;
+  double largest = 0, relative = 0, poison = 0;  // of |r|
   for (int i = chain_.n(); i-- > 0;) {
     const auto& k = chain_[i];
     const auto& X = X_[at(i)];
     H = H + momentum_[at(i)];
-    parts.add(k, V_[at(i)]);
     add_moment(k, X, moment);
     H_[at(i)] = H;
     moment_[at(i)] = moment;
-    const double rotor = k.armature * d[i] * rate;
-    const double p = along(k, X, H) + rotor;
+    const double force = tau[i] + pushed[i] + resistance(k, d[i] * rate, stiffness, q[i] + 0.5 * d[i]);
+    const double rotor = k.armature * d[i] * rate, push = half * force;
     const double turn = half * (coadjoint_along(k, X, V_[at(i)], H) + weight_along(k, X, moment, g_[at(i)]));
-    const double push = half * force(i, d[i]);
-    r_[i] = p - turn - from_->p[i] - push;
-    p_next_[i] = p + turn + push;
-    const double scale = std::abs(from_->p[i]) + parts.along(k) + std::abs(rotor) + std::abs(turn) +
-                         std::abs(push) + h_ * (k.weight + kQuiet * chain_.energy_scale) + kNothing;
-    const double size = std::abs(r_[i]);
+    r[i] = along(k, X, H) + rotor - turn - p[i] - push;
+    p_next[i] = p[i] + 2 * (turn + push);
+    if (rescale) {
+      parts.add(k, V_[at(i)]);
+      scale_inv[i] = 1 / (std::abs(p[i]) + parts.along(k) + std::abs(rotor) + std::abs(turn) +
+                          std::abs(push) + h * (k.weight + quiet) + kNothing);
+      parts.shift(X.p);
+    }
+    const double size = std::abs(r[i]);
     poison += size;
     largest = std::max(largest, size);
-    const bool worse = size * worst_scale > worst_size * scale;
-    worst_size = worse ? size : worst_size, worst_scale = worse ? scale : worst_scale;
+    relative = std::max(relative, size * scale_inv[i]);
     if (i == 0) break;
     H = to_parent(X, H);
-    parts.shift(X.p);
     moment = moment_to_parent(k, X, moment);
   }
   if (!std::isfinite(poison)) return {poison, poison};
-  return {largest * rate, worst_size / worst_scale};
+  rescale_ = relative > kFarOff;
+  return {largest * rate, relative};
 }
 
 template <class G>
 Residual MidpointStep<G>::evaluate(const VectorXd& d) noexcept {
-  forward(d);
+  forward(d.data());
   push_.evaluate(chain_, X_, *load_);
-  const Residual r = backward(d);
-  relative_ = r.relative;
-  return r;
+  return backward(d.data());
 }
 
 template <class G>
-void MidpointStep<G>::linearise(const VectorXd& d) noexcept {
-  for (int i = 0; i < chain_.n(); ++i) newton_.rows()[at(i)] = row(i, d[i]);
-  newton_.factorise(X_);
+bool MidpointStep<G>::newton_pays() const noexcept {
+  return options_.root == Root::newton ||
+         (options_.root == Root::automatic &&
+          (linearised_ ||
+           (contraction_.rate() < kResolved && contraction_.updates_left(kWorthNewton) == kWorthNewton)));
 }
 
-/// Eq. (16): d <- d - h M^-1 r.  Newton: the exact Jacobian, made anew where the last one no longer gains a
-/// factor of ten a time.
+/// Eq. (16): d <- d - h M^-1 r.  Newton: the exact Jacobian, made anew where the last one gains too
+/// little.
 template <class G>
 void MidpointStep<G>::correct(VectorXd& d) noexcept {
-  if (options_.root == Root::feedback) {
+  if (!newton_pays()) {
     rbd::solve<G, double>(chain_, frames_->data(), factor_->data(), r_.data(), u_.data(), r_.data());
     d -= h_ * r_;
     return;
   }
-  if (!linearised_ || relative_ > 0.1 * relative_at_correction_) linearise(d);
+  if (!linearised_ || contraction_.rate() > kStale) {
+    linearise(d);
+    feedback_rate_ = std::max(feedback_rate_, linearised_ ? 0 : contraction_.seen());
+    contraction_.sharpen();
+  }
   linearised_ = true;
-  relative_at_correction_ = relative_;
   newton_.solve(r_.data(), r_.data());
   d -= r_;
+}
+
+/// What the next step may expect, of feedback where there is a choice.  What was not seen in this one is
+/// trusted a little less; what Newton spared us from seeing, a little more, until it is tried again.
+template <class G>
+double MidpointStep<G>::remembered_rate() const noexcept {
+  const double before = IncrementHistory::rate(*from_, h_);
+  if (linearised_ && options_.root == Root::automatic)
+    return feedback_rate_ > 0 ? feedback_rate_ : kForget * before;
+  const double seen = contraction_.seen();
+  return std::min(1.0, seen > 0 ? std::max(seen, kForget * before) : kAge * before);
 }
 
 template class MidpointStep<SE3>;

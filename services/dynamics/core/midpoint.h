@@ -26,6 +26,7 @@ class MidpointStep final : public TierStep<G> {
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
   bool keeps_energy() const noexcept override { return true; }
   double turn_bound() const noexcept override { return kTurnBound; }
+  using Matrix = typename ChainNewton<G>::Matrix;
   StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
   /// The step that evaluate() and correct() are about.
@@ -41,37 +42,35 @@ class MidpointStep final : public TierStep<G> {
 
  private:
   void choose_factorisation(const VectorXd& d) noexcept;
-  void forward(const VectorXd& d) noexcept;
-  Residual backward(const VectorXd& d) noexcept;
-  JointRow<G> row(int i, double d) const noexcept;
+  void forward(const double* d) noexcept;
+  Residual backward(const double* d) noexcept;
+  JointRow<G> row(int i, double d, const typename G::template Attitude<double>& R, Matrix& P) const noexcept;
+  bool newton_pays() const noexcept;
+  double remembered_rate() const noexcept;
+  double work(const double* d) const noexcept;
   double diagonal(int i, double d) const noexcept;
-  double force(int i, double d) const noexcept;
 
   const Chain& chain_;
   const Options options_;
-  IncrementHistory history_;
   // the step being solved
   const Node<G>* from_ = nullptr;
   const Load<G>* load_ = nullptr;
-  double h_ = 0;
+  double h_ = 0, rate_ = 0;  ///< 1 / h
+  Contraction contraction_;
   const Frames<G>* frames_ = nullptr;  ///< where factor_ was made
   const Factors<G>* factor_ = nullptr;
   // scratch
-  VectorXd d_, r_, p_next_, extra_, u_;
+  VectorXd d_, r_, p_next_, scale_inv_, extra_, u_;  ///< scale_inv_: 1 / what a residual is measured by
   Frames<G> X_, X_factor_;
   Factors<G> own_factor_;
   Motions<G> V_, momentum_, H_;
   std::vector<typename G::template Direction<double>> g_, moment_;
   Push<G> push_;
+  bool rescale_ = true, brakes_ = false;  ///< brakes_: damping or stops
   // Newton: the factorisation serves while it converges fast
   ChainNewton<G> newton_;
-  double relative_ = 0, relative_at_correction_ = 0;
-  bool linearised_ = false;
+  bool linearised_ = false;   ///< in this step
+  double feedback_rate_ = 0;  ///< what feedback left before that
 };
-
-template <>
-JointRow<SE3> MidpointStep<SE3>::row(int i, double d) const noexcept;
-template <>
-JointRow<SE2> MidpointStep<SE2>::row(int i, double d) const noexcept;
 
 }  // namespace hamel::dynamics

@@ -2,13 +2,17 @@
 /// Newton's method for a chain: the exact Jacobian of an implicit step, factorised and applied in O(n).
 ///
 /// A change x of the joint increments changes link i's twist and attitude, and what it carries, by
-///   S_i = T_i S_{i-1} + b_i x_i                       S = (change of twist V, turn phi of the frame)
-///   Z_i = K_i S_i + T_{i+1}^T (Z_{i+1} - e_{i+1} x_{i+1})   Z = (change of momentum h, change of first
-///   moment m) change of residual_i = l_i . Z_i + k_i . S_i + c_i x_i
-/// with T = diag(X, R^T).  Joint by joint from the tip, Z_i = P_i S_i + z_i: the articulated-body idea with a
-/// non-symmetric 9 x 9 instead of a symmetric 6 x 6.  What b, e, l, k, K are is the tier's affair.
+///   S_i = T_i S_{i-1} + b_i x_i                             S = (change of twist, turn of the frame)
+///   Z_i = K_i S_i + T_{i+1}^T (Z_{i+1} - e_{i+1} x_{i+1})   Z = (change of momentum, of first moment)
+///   change of residual_i = l_i . Z_i + k_i . S_i + c_i x_i
+/// Joint by joint from the tip, Z_i = P_i S_i + z_i: the articulated-body idea with a matrix that is not
+/// symmetric.  What b, e, l, k, K are is the tier's affair.
+///
+/// All in axes that do not turn from link to link, so that T moves the origin and nothing else: the plane's,
+/// or the world's with gravity along the third.  There turns about gravity and moments along it do nothing
+/// and are left out.
 
-#include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "common/rbd/sweeps.h"
@@ -18,70 +22,67 @@ namespace hamel::dynamics {
 using rbd::SE2;
 using rbd::SE3;
 
-/// Six coordinates of a twist or momentum, three of a turn or first moment.
-struct Nine {
-  rbd::Half6<double> h;
-  lie::Vec3<double> m;
-};
-inline Nine operator+(const Nine& x, const Nine& y) { return {x.h + y.h, x.m + y.m}; }
-inline Nine operator-(const Nine& x, const Nine& y) { return {x.h - y.h, x.m - y.m}; }
-inline Nine operator*(double s, const Nine& x) { return {s * x.h, s * x.m}; }
-inline double dot(const Nine& x, const Nine& y) {
-  return dot(x.h.a, y.h.a) + dot(x.h.l, y.h.l) + dot(x.m, y.m);
-}
+template <int N>
+using Column = std::array<double, static_cast<std::size_t>(N)>;
 
-/// 9 x 9 as blocks of 3: B[row][column].
-struct Nine2 {
-  lie::Mat3<double> B[3][3];
+/// The linearised equation of one joint.
+template <int Changes, int Carries>
+struct Linear {
+  using Change = Column<Changes>;                           ///< S
+  using Carried = Column<Carries>;                          ///< Z
+  using Matrix = std::array<Change, std::size_t{Carries}>;  ///< P, row by row
+  Change b{}, k{};
+  Carried e{}, l{};
+  double c = 0;
 };
-
-/// The linearised equation of one joint, and Z = P S beyond it.
 template <class G>
 struct JointRow;
-
+/// Twist (angular, linear) and turn about two axes; momentum (angular, linear) and moment along the two.
 template <>
-struct JointRow<SE3> {
-  using Change = Nine;   ///< S
-  using Carried = Nine;  ///< Z
-  using Matrix = Nine2;  ///< P
-  Nine b, e, l, k;
-  double c = 0;
-  lie::Mat3<double> K[2][2];  ///< change of the link's own momentum with its twist
+struct JointRow<SE3> : Linear<8, 8> {
+  using Lever = lie::Vec3<double>;
 };
-
-/// In the plane a turn is one number and a first moment two: S has four coordinates, Z five.
+/// In the plane: twist (angular, linear) and turn; momentum (angular, linear) and first moment.
 template <>
-struct JointRow<SE2> {
-  using Change = Eigen::Vector4d;               ///< twist (angular, linear), turn
-  using Carried = Eigen::Matrix<double, 5, 1>;  ///< momentum (angular, linear), first moment
-  using Matrix = Eigen::Matrix<double, 5, 4>;
-  Change b = Change::Zero(), k = Change::Zero();
-  Carried e = Carried::Zero(), l = Carried::Zero();
-  double c = 0;
-  Eigen::Matrix3d K = Eigen::Matrix3d::Zero();
+struct JointRow<SE2> : Linear<4, 5> {
+  using Lever = lie::Vec2<double>;
 };
 
 template <class G>
 class ChainNewton {
  public:
   using Row = JointRow<G>;
+  using Matrix = typename Row::Matrix;
+  using Attitude = typename G::template Attitude<double>;
+  using Frames = std::vector<typename G::template Frame<double>>;
   explicit ChainNewton(const typename G::Chain& chain);
-  /// The caller fills rows(), then factorises at the frames X.
-  std::vector<Row>& rows() noexcept { return rows_; }
-  void factorise(const std::vector<typename G::template Frame<double>>& X) noexcept;
+
+  /// Asks row_of(i, attitude of link i, P), from the tip, for each joint's row; it also adds K_i to P.
+  template <class RowOf>
+  void factorise(const Frames& X, const RowOf& row_of) noexcept {
+    place(X);
+    Matrix P{};
+    for (int i = chain_.n(); i-- > 0;) {
+      const Row row = row_of(i, R_[static_cast<std::size_t>(i)], P);
+      eliminate(i, row, P);
+    }
+  }
   /// x with J x = r.  x may be r.
   void solve(const double* r, double* x) noexcept;
 
  private:
   struct JointFactor {
-    typename Row::Change u;
-    typename Row::Carried v;
+    typename Row::Change b, u;
+    typename Row::Carried l, v;
+    typename Row::Lever p;  ///< from the parent's origin to this one
     double D_inv = 0;
   };
+  void place(const Frames& X) noexcept;
+  void eliminate(int i, const Row& row, Matrix& P) noexcept;
+
   const typename G::Chain& chain_;
-  std::vector<Row> rows_;
+  std::vector<Attitude> R_;
   std::vector<JointFactor> factor_;
-  std::vector<typename G::template Frame<double>> X_;
   std::vector<double> y_;
 };
 

@@ -47,17 +47,18 @@ void Node<G>::move_with_momentum(const Chain& chain, const VectorXd& p_new) noex
 template <class G>
 void Node<G>::move_with_velocity(const Chain& chain, const VectorXd& qd_new) noexcept {
   qd = qd_new;
+  const double* rate = qd.data();
   typename G::template Motion<double> V, h;
   for (int i = 0; i < chain.n(); ++i) {
     const std::size_t s = static_cast<std::size_t>(i);
     V = to_child(X[s], V);
-    add_along(chain[i], X[s], V, qd[i]);
+    add_along(chain[i], X[s], V, rate[i]);
     momentum_[s] = momentum(chain[i], X[s], V);
   }
   for (int i = chain.n(); i-- > 0;) {
     const std::size_t s = static_cast<std::size_t>(i);
     h = h + momentum_[s];
-    p[i] = along(chain[i], X[s], h) + chain[i].armature * qd[i];
+    p.data()[i] = along(chain[i], X[s], h) + chain[i].armature * rate[i];
     h = to_parent(X[s], h);
   }
   energy_J = 0.5 * p.dot(qd) + potential_J;
@@ -65,7 +66,7 @@ void Node<G>::move_with_velocity(const Chain& chain, const VectorXd& qd_new) noe
 
 template <class G>
 bool Node<G>::finite() const noexcept {
-  return std::isfinite(energy_J) && q.allFinite() && p.allFinite() && qd.allFinite();
+  return std::isfinite(energy_J) && all_finite(q) && all_finite(p) && all_finite(qd);
 }
 
 template struct Node<SE3>;

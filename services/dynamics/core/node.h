@@ -18,6 +18,13 @@ using Motions = std::vector<typename G::template Motion<double>>;
 template <class G>
 using Factors = std::vector<rbd::Factor<G, double>>;
 
+/// True when all numbers are finite.  No branch: what is not finite stays so.
+template <class Numbers>
+bool all_finite(const Numbers& x) noexcept {
+  const Eigen::Map<const Eigen::ArrayXd> a(x.data(), static_cast<Eigen::Index>(x.size()));
+  return (a * 0.0).sum() == 0;
+}
+
 /// Configuration, momentum and velocity with the mass matrix factorised there.  place() first, then one of
 /// the others.  Assignments keep the sizes of the constructor: nothing allocates.
 template <class G>

@@ -14,7 +14,6 @@ template <class G>
 PaperStep<G>::PaperStep(const Chain& chain, const Options& options)
     : chain_(chain),
       options_(options),
-      history_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
       p_(d_),
@@ -22,18 +21,21 @@ PaperStep<G>::PaperStep(const Chain& chain, const Options& options)
       V_(at(chain.n())),
       momentum_(at(chain.n())),
       push_(chain.n()),
+      contraction_(chain.n()),
       newton_(chain) {}
 
 template <class G>
 StepReport PaperStep<G>::advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept {
   from_ = &from, load_ = &load, h_ = h;
   push_.evaluate(chain_, from.X, load);
-  history_.guess(from, h, d_);
+  IncrementHistory::guess(from, h, d_);
   if (options_.start == Start::previous) d_.setZero();
-  StepReport report = find_root(*this, options_, d_);
+  contraction_ = Contraction(chain_.n());
+  StepReport report = find_root(*this, options_, contraction_, d_);
   if (!report.usable()) return report;
+  move(d_);
   for (int i = 0; i < chain_.n(); ++i) report.work_J += force(i, d_[i]) * d_[i];
-  IncrementHistory::push(from, h, d_, to);
+  IncrementHistory::push(from, h, 0, d_, to);
   u_ = from.q + d_;
   to.place(chain_, u_);
   for (int i = 0; i < chain_.n(); ++i) V_[at(i)] = carried(from.X[at(i)], to.X[at(i)], V_[at(i)]);
@@ -71,14 +73,20 @@ void PaperStep<G>::gather(const Node<G>& node, double share, double sign, Vector
   }
 }
 
+/// Twists (9).
 template <class G>
-Residual PaperStep<G>::evaluate(const VectorXd& d) noexcept {
+void PaperStep<G>::move(const VectorXd& d) noexcept {
   typename G::template Motion<double> V;
   for (int i = 0; i < chain_.n(); ++i) {
     V = to_child(from_->X[at(i)], V);
     add_along(chain_[i], from_->X[at(i)], V, d[i] / h_);
     V_[at(i)] = V;
   }
+}
+
+template <class G>
+Residual PaperStep<G>::evaluate(const VectorXd& d) noexcept {
+  move(d);
   gather(*from_, 1 - options_.alpha, -1, p_);
   Residual worst;
   MomentumParts parts;
@@ -97,55 +105,74 @@ Residual PaperStep<G>::evaluate(const VectorXd& d) noexcept {
   return worst;
 }
 
+namespace {
+/// The change of a link's momentum with its twist, column by column of unit twists.
+template <int N, class Unit, class Column, class Matrix>
+void add_columns(const Unit& unit, const Column& column, Matrix& P) {
+  for (std::size_t c = 0; c < std::size_t{N}; ++c) {
+    std::array<double, std::size_t{N}> one{};
+    one[c] = 1;
+    const std::array<double, std::size_t{N}> out = column(unit(one));
+    for (std::size_t r = 0; r < std::size_t{N}; ++r) P[r][c] += out[r];
+  }
+}
+}  // namespace
+
 /// With X at q^k the twists alone depend on d: the change of a link's momentum is
 ///   (I - (1 - alpha) h (ad_V^T I + d/dV ad_V^T (I V fixed))) (change of V).
 template <>
 void PaperStep<SE3>::linearise() noexcept {
   const double s = (1 - options_.alpha) * h_;
-  for (int i = 0; i < chain_.n(); ++i) {
+  newton_.factorise(from_->X, [&](int i, const lie::Mat3<double>& R, JointRow<SE3>::Matrix& P) {
     const rbd::AxisLink& k = chain_[i];
     const rbd::LinkPose<double>& X = from_->X[at(i)];
     const rbd::Half6<double>& V = V_[at(i)];
     const rbd::Half6<double> IV = momentum(k, X, V), A = joint_axis(k, X);
-    JointRow<SE3>& j = newton_.rows()[at(i)];
-    j = {};
-    for (int c = 0; c < 6; ++c) {
-      rbd::Half6<double> unit;
-      double* const part[] = {&unit.a.x, &unit.a.y, &unit.a.z, &unit.l.x, &unit.l.y, &unit.l.z};
-      *part[c] = 1;
-      const rbd::Half6<double> I_unit = momentum(k, X, unit);
-      const rbd::Half6<double> column = I_unit - s * (coadjoint(V, I_unit) + coadjoint(unit, IV));
-      lie::Mat3<double>&top = j.K[0][c / 3], &bottom = j.K[1][c / 3];
-      (c % 3 == 0 ? top.x : c % 3 == 1 ? top.y : top.z) = column.a;
-      (c % 3 == 0 ? bottom.x : c % 3 == 1 ? bottom.y : bottom.z) = column.l;
-    }
-    j.l.h = A;
-    j.b.h = (1 / h_) * A;
+    const auto level = [&](const rbd::Half6<double>& x) -> std::array<double, 6> {
+      const lie::Vec3<double> a = R * x.a, l = R * x.l;
+      return {a.x, a.y, a.z, l.x, l.y, l.z};
+    };
+    add_columns<6>(
+        [&](const std::array<double, 6>& x) -> rbd::Half6<double> {
+          return {transpose_times(R, lie::Vec3<double>{x[0], x[1], x[2]}),
+                  transpose_times(R, lie::Vec3<double>{x[3], x[4], x[5]})};
+        },
+        [&](const rbd::Half6<double>& unit) {
+          const rbd::Half6<double> I_unit = momentum(k, X, unit);
+          return level(I_unit - s * (coadjoint(V, I_unit) + coadjoint(unit, IV)));
+        },
+        P);
+    const std::array<double, 6> axis = level(A);
+    JointRow<SE3> j;
+    for (std::size_t c = 0; c < 6; ++c) j.l[c] = axis[c], j.b[c] = axis[c] / h_;
     j.c = k.armature / h_ + 0.5 * k.damping;
-  }
-  newton_.factorise(from_->X);
+    return j;
+  });
 }
 template <>
 void PaperStep<SE2>::linearise() noexcept {
   const double s = (1 - options_.alpha) * h_;
-  for (int i = 0; i < chain_.n(); ++i) {
+  newton_.factorise(from_->X, [&](int i, rbd::NoAttitude, JointRow<SE2>::Matrix& P) {
     const rbd::PlanarLink& k = chain_[i];
     const rbd::PlanarFrame<double>& X = from_->X[at(i)];
     const rbd::Half3<double>& V = V_[at(i)];
     const rbd::Half3<double> IV = momentum(k, X, V), A = joint_axis(k, X);
-    JointRow<SE2>& j = newton_.rows()[at(i)];
-    j = {};
-    for (int c = 0; c < 3; ++c) {
-      const rbd::Half3<double> unit{c == 0 ? 1.0 : 0.0, {c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0}};
-      const rbd::Half3<double> I_unit = momentum(k, X, unit);
-      const rbd::Half3<double> column = I_unit - s * (coadjoint(V, I_unit) + coadjoint(unit, IV));
-      j.K.col(c) << column.a, column.l.x, column.l.y;
-    }
-    j.l.head<3>() << A.a, A.l.x, A.l.y;
-    j.b.head<3>() = j.l.head<3>() / h_;
+    add_columns<3>(
+        [](const std::array<double, 3>& x) -> rbd::Half3<double> {
+          return {x[0], {x[1], x[2]}};
+        },
+        [&](const rbd::Half3<double>& unit) -> std::array<double, 3> {
+          const rbd::Half3<double> I_unit = momentum(k, X, unit);
+          const rbd::Half3<double> z = I_unit - s * (coadjoint(V, I_unit) + coadjoint(unit, IV));
+          return {z.a, z.l.x, z.l.y};
+        },
+        P);
+    JointRow<SE2> j;
+    j.l = {A.a, A.l.x, A.l.y, 0, 0};
+    j.b = {A.a / h_, A.l.x / h_, A.l.y / h_, 0};
     j.c = k.armature / h_ + 0.5 * k.damping;
-  }
-  newton_.factorise(from_->X);
+    return j;
+  });
 }
 
 /// Eq. (16): q^{k+1} <- q^{k+1} - h^2 M(q^k)^-1 tau_e, or Newton.

@@ -31,19 +31,20 @@ class PaperStep final : public TierStep<G> {
   void correct(VectorXd& d) noexcept;
 
  private:
+  void move(const VectorXd& d) noexcept;
   void linearise() noexcept;
   double force(int i, double d) const noexcept;
   void gather(const Node<G>& node, double share, double sign, VectorXd& p) noexcept;
 
   const Chain& chain_;
   const Options options_;
-  IncrementHistory history_;
   const Node<G>* from_ = nullptr;
   const Load<G>* load_ = nullptr;
   double h_ = 0;
   VectorXd d_, r_, p_, u_;
   Motions<G> V_, momentum_;
   Push<G> push_;
+  Contraction contraction_;
   ChainNewton<G> newton_;
 };
 

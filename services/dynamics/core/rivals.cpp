@@ -15,11 +15,12 @@ double Field<G>::operator()(const VectorXd& q, const VectorXd& qd, const Load<G>
                             VectorXd& qdd) noexcept {
   if (load.pushed) rbd::place(chain_, q.data(), sweep_.X.data());
   push_.evaluate(chain_, sweep_.X, load);
-  double power = 0;
+  const double *at = q.data(), *rate = qd.data(), *commanded = load.tau.data(), *pushed = push_.data();
+  double power = 0, *tau = tau_.data();
   for (int i = 0; i < chain_.n(); ++i) {
-    tau_[i] =
-        load.tau[i] + push_[i] + (stop_stiffness_ > 0 ? stop_torque(chain_[i], stop_stiffness_, q[i]) : 0);
-    power += (tau_[i] - chain_[i].damping * qd[i]) * qd[i];
+    tau[i] = commanded[i] + pushed[i];
+    if (stop_stiffness_ > 0) tau[i] += stop_torque(chain_[i], stop_stiffness_, at[i]);
+    power += (tau[i] - chain_[i].damping * rate[i]) * rate[i];
   }
   rbd::forward_dynamics(chain_, q.data(), qd.data(), tau_.data(), sweep_, qdd.data());
   return power;

@@ -3,7 +3,6 @@
 /// it is small against them.  The sum itself is no measure: it vanishes where the parts cancel, as at a joint
 /// that carries no torque when an arm is set in motion from rest.
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/rbd/sweeps.h"
@@ -21,18 +20,16 @@ inline constexpr double kQuiet = 1e-10;
 inline double norm1(const lie::Vec3<double>& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 inline double norm1(const lie::Vec2<double>& v) { return std::abs(v.x) + std::abs(v.y); }
 inline double norm1(double v) { return std::abs(v); }
-inline double largest(const lie::Sym3<double>& I) { return std::max({I.xx, I.yy, I.zz}); }
-inline double largest(double I) { return I; }
 
 /// Bounds of the angular and linear parts of a composite momentum, gathered from the tip as the momentum is.
 struct MomentumParts {
   double angular = 0, linear = 0;  ///< [kg m^2/s], [kg m/s]
   /// Adds a link that moves with twist V.
-  template <class Link, class Motion>
-  void add(const Link& k, const Motion& V) {
-    const double w = norm1(V.a), v = norm1(V.l), moment = norm1(k.h);
-    angular += largest(k.I_o) * w + moment * v;
-    linear += k.mass * v + moment * w;
+  template <class Motion>
+  void add(const rbd::JointNumbers& k, const Motion& V) {
+    const double w = norm1(V.a), v = norm1(V.l);
+    angular += k.inertia_size * w + k.moment_size * v;
+    linear += k.mass * v + k.moment_size * w;
   }
   /// Moves the point of reference by p.
   template <class Vector>

@@ -33,6 +33,7 @@ class Push {
     }
   }
   double operator[](int i) const noexcept { return Q_[i]; }
+  const double* data() const noexcept { return Q_.data(); }
 
  private:
   VectorXd Q_;
