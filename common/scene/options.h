@@ -99,7 +99,7 @@ struct ReduceOptions {
   Choice plane = Choice::automatic;      ///< exact: SE(2) where the arm is planar
   Choice gravity = Choice::automatic;    ///< exact: none where it works on no joint
   Choice obstacles = Choice::automatic;  ///< exact: those that can never matter are culled, set by set
-  Choice links = Choice::automatic;      ///< exact: links that reach no obstacle are not asked for distances
+  Choice links = Choice::automatic;      ///< exact but for their reports: links far from all are not measured
   Choice rate = Choice::automatic;       ///< bounded: perception no faster than the obstacles need
   Choice step = Choice::automatic;       ///< bounded: tier and step chosen for the accuracy
 };

@@ -143,13 +143,14 @@ void note_obstacles(Scene& s) {
              cull ? "out of reach of every force, and never the nearest to a link; each set is sifted once"
                   : "forbidden"),
         static_cast<double>(all.size()), static_cast<double>(kept.size()), "obstacles");
-  const bool skip = wanted(s.reduce, s.reduce.links, true);
+  const bool skip = wanted(s.reduce, s.reduce.links, false);
   const auto far = static_cast<std::size_t>(std::count_if(
       floor_m.begin(), floor_m.end(), [&](double f) { return f > s.planner.rho0_m && std::isfinite(f); }));
   const int n = s.robot.chain.n();
   sizes(note(s, "links", skip && far > 0,
              count(skip ? far : 0, "links not asked for distances while others are nearer"),
-             skip ? "no standing obstacle comes within rho0 of them" : "forbidden"),
+             skip ? "no standing obstacle comes within rho0 of them; their report shows none"
+                  : "fidelity: fastest would; commands stay the same, but their report shows no distance"),
         n, n - static_cast<int>(skip ? far : 0), "links");
 }
 

@@ -21,7 +21,8 @@ namespace hamel::scene {
 ///              every slide of a planar arm; the potential energy loses its constant
 ///   terms      exact: stop torques are not evaluated where there are no stops
 ///   obstacles  exact: those that never matter (reach.h) are dropped from each set as it arrives
-///   links      exact: links that no obstacle comes near are not asked for distances; they report none
+///   links      exact in all but one thing, so only for `fastest`: links that no obstacle comes near are not
+///              asked for distances and report none
 ///   rate       bounded [m]: scripted obstacles are published no faster than carrying them on needs
 ///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
 void reduce(Scene& s);

@@ -17,7 +17,7 @@ constexpr double kHorizon_s = 5;  ///< a moving obstacle is culled when it is ou
 
 ObstacleView::ObstacleView(const scene::Scene& scene)
     : cull_(scene::wanted(scene.reduce, scene.reduce.obstacles, true)),
-      skip_links_(scene::wanted(scene.reduce, scene.reduce.links, true)) {
+      skip_links_(scene::wanted(scene.reduce, scene.reduce.links, false)) {
   if (cull_ || skip_links_) reach_.emplace(scene.robot, scene.planner);
 }
 

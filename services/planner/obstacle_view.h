@@ -19,7 +19,8 @@ class ObstacleView {
  public:
   /// Shows every obstacle.
   ObstacleView() = default;
-  /// Leaves out what the scene's reductions `obstacles` and `links` allow; the planner's output is the same.
+  /// Leaves out what the scene's reductions `obstacles` and `links` allow; the planner's commands are the
+  /// same.
   explicit ObstacleView(const scene::Scene& scene);
   /// Knows sets of this incarnation of the arm only, from now on: those of an earlier one are forgotten and
   /// not taken any more, those of a later one wait for it.

@@ -85,6 +85,9 @@ void expect_equal(const scene::Scene& written) {
       EXPECT_NEAR(x.clearance_m, y.clearance_m, 100 * grown + 1e-12);
     }
   }
+  scene::Scene linked = exact;
+  linked.reduce.links = scene::Choice::on;
+  EXPECT_EQ(run(linked).same_commands, b.same_commands) << "links left out leave every bit of the command";
   const bool same_arm = full.robot.chain.n() == exact.robot.chain.n() && !rbd::is_planar(exact.robot.chain) &&
                         full.robot.chain.gravity_W_mps2() == exact.robot.chain.gravity_W_mps2();
   if (same_arm) {
