@@ -216,7 +216,7 @@ void reduce(Scene& s) {
 std::string names_in_force(const Scene& s) {
   std::string out;
   for (const Reduction& r : s.reductions) {
-    const bool did = r.in_force && (r.before != r.after || r.name == "obstacles");
+    const bool did = r.in_force && (r.before != r.after || r.name == "obstacles" || r.name == "step");
     if (did) out.append(out.empty() ? "" : ", ").append(r.name);
   }
   if (out.empty()) out.append("none");
