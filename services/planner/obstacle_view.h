@@ -22,6 +22,8 @@ class ObstacleView {
   /// Leaves out what the scene's reductions `obstacles` and `links` allow; the planner's commands are the
   /// same.
   explicit ObstacleView(const scene::Scene& scene);
+  ObstacleView(const ObstacleView&) = delete;  // what it shows points into it
+  ObstacleView& operator=(const ObstacleView&) = delete;
   /// Knows sets of this incarnation of the arm only, from now on: those of an earlier one are forgotten and
   /// not taken any more, those of a later one wait for it.
   void begin(std::uint64_t incarnation);
