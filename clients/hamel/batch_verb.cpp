@@ -49,7 +49,8 @@ class Tally {
   void print() const {
     fmt::print("{} variations\n", rows_);
     for (const auto& [name, k] : outcomes_)
-      fmt::print("  {:<34} {:>8} {:>7.1f} %\n", name, k, 100.0 * static_cast<double>(k) / static_cast<double>(rows_));
+      fmt::print("  {:<34} {:>8} {:>7.1f} %\n", name, k,
+                 100.0 * static_cast<double>(k) / static_cast<double>(rows_));
     fmt::print("  {:<34} {:>8}\n", "with contact", contacts_);
     fmt::print("  {:<34} {:>10} {:>10} {:>10}\n", "", "least", "median", "most");
     line("time to goal [s]", time_);

@@ -8,10 +8,9 @@
 #include <fstream>
 
 #include "clients/hamel/gnuplot.h"
+#include "clients/hamel/motion.h"
 #include "common/rbd/rbd.h"
-#include "common/runtime/log.h"
 #include "common/runtime/options.h"
-#include "common/runtime/signals.h"
 #include "services/dynamics/core/integrator.h"
 
 namespace hamel::client {
@@ -149,7 +148,7 @@ std::optional<Problem> figure4(const std::filesystem::path& folder, const scene:
       "csv using 1:2 skip 1 with lines lc rgb '#114488' title 'hamel, Eq. (13)', "
       "csv using 1:3 skip 1 with lines dt 2 lc rgb '#cc6644' title 'semi-implicit Euler'\n"
       "set title 'Distance from the reference'\nset logscale y\nset yrange [1e-8:*]\nset format y "
-      "'10^{%T}'\nset ylabel '[m]'\n"
+      "'1e%T'\nset ylabel '[m]'\n"
       "plot csv using 1:(abs($2-$5)+1e-12) skip 1 with lines lc rgb '#114488' title 'hamel, Eq. (13)', "
       "csv using 1:(abs($3-$5)+1e-12) skip 1 with lines lc rgb '#cc6644' title 'semi-implicit Euler', "
       "csv using 1:(abs($4-$5)+1e-12) skip 1 with lines lc rgb '#228833' title 'midpoint'\n"
@@ -166,7 +165,7 @@ std::optional<Problem> figure5(const std::filesystem::path& folder, const scene:
       fmt::format("set multiplot layout 2,1\nset key off\nset xlabel 't [s]'\nset ylabel 'iterations'\n"
                   "set yrange [0:{}]\nset ytics 1\nset title 'Feedback (16) at every step'\n"
                   "plot csv using 1:2 skip 1 with points pt 7 ps 0.2 lc rgb '#114488'\n"
-                  "set yrange [1e-15:1e-7]\nset ytics auto\nset logscale y\nset format y '10^{{%T}}'\n"
+                  "set yrange [1e-15:1e-7]\nset ytics auto\nset logscale y\nset format y '1e%T'\n"
                   "set ylabel 'residual [N m]'\nset title 'Torque left unbalanced'\n"
                   "plot csv using 1:($3+1e-18) skip 1 with points pt 7 ps 0.2 lc rgb '#114488', 1e-8 lc rgb "
                   "'#cc6644'\n"
@@ -199,19 +198,15 @@ std::optional<Problem> draw_all(const std::filesystem::path& folder, const scene
 }  // namespace
 
 int figures(const FiguresArgs& args) {
-  runtime::StopSignal stop;
-  runtime::start_log("hamel", false);
-  runtime::RunOptions o;
-  o.scene_path = args.scene_path;
-  o.overrides = args.overrides;
-  const auto loaded = runtime::load(o);
-  if (!loaded) return runtime::complain("hamel figures", loaded.error());
-  std::error_code error;
-  std::filesystem::create_directories(args.folder, error);
-  if (error) return runtime::complain("hamel figures", {{args.folder, "cannot be made: " + error.message()}});
-  if (const auto p = draw_all(args.folder, loaded.value(), stop))
-    return runtime::complain("hamel figures", {*p});
-  return stop.requested() ? runtime::kInterrupted : runtime::kDone;
+  const auto work = [&](const scene::Scene& scene, const runtime::StopSignal& stop) {
+    std::error_code error;
+    std::filesystem::create_directories(args.folder, error);
+    if (error)
+      return runtime::complain("hamel figures", {{args.folder, "cannot be made: " + error.message()}});
+    const auto p = draw_all(args.folder, scene, stop);
+    return p ? runtime::complain("hamel figures", {*p}) : int{runtime::kDone};
+  };
+  return on_motion("hamel figures", args.scene_path, args.overrides, work);
 }
 
 }  // namespace hamel::client

@@ -155,8 +155,10 @@ CLI::App* add_plot(CLI::App& app, client::PlotArgs& a) {
 
 CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
   auto* trade =
-      app.add_subcommand("trade", "measure accuracy against cost of every tier on a scene's free motion");
-  trade->add_option("scene", a.scene_path, "scene file (.textproto)")->required()->type_name("SCENE");
+      app.add_subcommand("trade", "measure accuracy against cost of every tier on an arm's free motion");
+  trade->add_option("model", a.scene_path, "scene (.textproto), or a robot (.urdf) that falls from rest")
+      ->required()
+      ->type_name("MODEL|SCENE");
   add_overrides(*trade, a.overrides, "override a field of the scene; repeat");
   trade->add_option("--horizon", a.horizon_s, "seconds of motion instead of the scene's")
       ->check(CLI::PositiveNumber)

@@ -12,6 +12,9 @@ namespace hamel::client {
 
 namespace {
 
+/// Share of the energy scale that an integrator may make up before the table says that it did.
+constexpr double kDriftOfConcern = 0.05;
+
 nlohmann::ordered_json number(double v) {
   if (!std::isfinite(v)) return nullptr;
   return v;
@@ -77,7 +80,9 @@ void print_table(const scene::Scene& scene, const Outcome& o, const std::string&
     line("path length", si(o.path_length_m, "m"));
   }
   line("reductions", scene::names_in_force(scene));
-  line("energy drift", fmt::format("{:.2e} of the energy scale", o.summary.energy_drift_rel));
+  const bool lost = o.summary.energy_drift_rel > kDriftOfConcern;
+  line("energy drift", fmt::format("{:.2e} of the energy scale{}", o.summary.energy_drift_rel,
+                                   lost ? ": the step is too long for this motion, do not trust it" : ""));
   line("iterations", fmt::format("mean {:.2f}, max {}", o.summary.iterations_mean, o.summary.iterations_max));
   line("residual max", fmt::format("{:.2e} N m", o.summary.residual_max_Nm));
   line("steps", fmt::format("{}{}", o.summary.steps,

@@ -11,10 +11,9 @@
 #include <map>
 
 #include "clients/hamel/gnuplot.h"
+#include "clients/hamel/motion.h"
 #include "clients/hamel/trade_choice.h"
-#include "common/runtime/log.h"
 #include "common/runtime/options.h"
-#include "common/runtime/signals.h"
 
 namespace hamel::client {
 
@@ -37,8 +36,12 @@ class Progress {
 std::string small(double v) { return std::isfinite(v) ? fmt::format("{:.1e}", v) : "-"; }
 
 void print_reference(const scene::Scene& s, const trade::Motion& m, const trade::Reference& r) {
-  fmt::print("{}: free motion of {} ({} joints) over {:.6g} s{}\n", s.name, s.robot.name, m.chain.n(),
-             m.horizon_s, s.steered ? ", planner and compensation of gravity off" : "");
+  fmt::print("{}: free motion of {} ({} joints) over {:.6g} s\n", s.name, s.robot.name, m.chain.n(),
+             m.horizon_s);
+  if (s.steered)
+    fmt::print(
+        "this scene is steered; measured is the arm left to itself from the same start: no planner, no\n"
+        "obstacles, no compensation of gravity.  It may move faster or slower than when it is steered.\n");
   if (r.valid_s <= 0)
     fmt::print("reference: none: two runs of gauss-8 disagree within {:.6g} s; joint errors mean nothing\n",
                m.horizon_s / trade::kSamples);
@@ -112,7 +115,7 @@ std::optional<Problem> draw_all(const std::string& path, const std::string& titl
   for (const Measured& m : all)
     if (m.on_front) s.add("{} {}\n", scale * trade::cost(m, by), m.joint_error);
   s.add(
-      "EOD\nset multiplot layout 1,2 title \"{}\" noenhanced\nset logscale xy\nset format '10^{{%T}}'\nset "
+      "EOD\nset multiplot layout 1,2 title \"{}\" noenhanced\nset logscale xy\nset format '1e%T'\nset "
       "grid\nset xlabel '{}'\n",
       title,
       by == trade::Cost::time ? "time of a simulated second [us]" : "evaluations of a simulated second");
@@ -156,19 +159,20 @@ int print_recommendation(const TradeArgs& args, const trade::Motion& m, const st
   return runtime::kDone;
 }
 
-}  // namespace
+/// Every measurement, or what there is of them when told to end.
+std::vector<Measured> measure_all(const trade::Motion& motion, const trade::Reference& reference, bool quick,
+                                  const trade::Watch& watch, Progress& progress) {
+  std::vector<Measured> all;
+  const auto candidates = trade::candidates(motion, quick);
+  for (std::size_t i = 0; i < candidates.size() && !watch.stop(); ++i) {
+    progress.say(fmt::format("{}/{} {} dt {:.4g} s", i + 1, candidates.size(), trade::label(candidates[i]),
+                             candidates[i].dt_s));
+    all.push_back(trade::measure(motion, candidates[i], reference, watch));
+  }
+  return all;
+}
 
-int trade(const TradeArgs& args) {
-  runtime::StopSignal stop;
-  runtime::start_log("hamel", false);
-  runtime::RunOptions o;
-  o.scene_path = args.scene_path;
-  o.overrides = args.overrides;
-  const auto loaded = runtime::load(o);
-  if (!loaded) return runtime::complain("hamel trade", loaded.error());
-  const scene::Scene& s = loaded.value();
-  if (!args.plot_path.empty())
-    if (const auto p = check_picture_name(args.plot_path)) return runtime::complain("hamel trade", {*p});
+int sweep(const TradeArgs& args, const scene::Scene& s, const runtime::StopSignal& stop) {
   const trade::Cost by = args.by == "time" ? trade::Cost::time : trade::Cost::evaluations;
   const trade::Motion motion{.chain = s.robot.chain,
                              .q0 = s.q0,
@@ -176,24 +180,16 @@ int trade(const TradeArgs& args) {
                              .horizon_s = args.horizon_s > 0 ? args.horizon_s : s.duration_s,
                              .tick_s = args.tick_s > 0 ? args.tick_s : scene::kInf,
                              .base = s.dynamics};
-  const trade::Watch watch{
-      [] {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-      },
-      [&stop] { return stop.requested(); }};
-
-  std::vector<Measured> all;
+  const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch(); };
+  const trade::Watch watch{[&] { return std::chrono::duration<double>(now()).count(); },
+                           [&] { return stop.requested(); }};
   trade::Reference reference;
+  std::vector<Measured> all;
   {
     Progress progress;
     progress.say("converging the reference");
     reference = trade::converge(motion, watch);
-    const auto candidates = trade::candidates(motion, args.quick);
-    for (std::size_t i = 0; i < candidates.size() && !stop.requested(); ++i) {
-      progress.say(fmt::format("{}/{} {} dt {:.4g} s", i + 1, candidates.size(), trade::label(candidates[i]),
-                               candidates[i].dt_s));
-      all.push_back(trade::measure(motion, candidates[i], reference, watch));
-    }
+    all = measure_all(motion, reference, args.quick, watch, progress);
   }
   if (stop.requested()) return runtime::kInterrupted;
   trade::mark_front(all, reference, by);
@@ -207,6 +203,16 @@ int trade(const TradeArgs& args) {
     if (const auto p = draw_all(args.plot_path, s.name, all, by))
       return runtime::complain("hamel trade", {*p});
   return code;
+}
+
+}  // namespace
+
+int trade(const TradeArgs& args) {
+  if (!args.plot_path.empty())
+    if (const auto p = check_picture_name(args.plot_path)) return runtime::complain("hamel trade", {*p});
+  return on_motion(
+      "hamel trade", args.scene_path, args.overrides,
+      [&](const scene::Scene& s, const runtime::StopSignal& stop) { return sweep(args, s, stop); });
 }
 
 }  // namespace hamel::client

@@ -7,7 +7,7 @@
 namespace hamel::client {
 
 struct TradeArgs {
-  std::string scene_path;
+  std::string scene_path;  ///< scene, or a robot's URDF
   std::vector<std::string> overrides;
   std::string csv_path, plot_path;  ///< empty: none
   double horizon_s = 0;             ///< 0: the scene's duration

@@ -8,6 +8,7 @@
 #include "common/files/scene_convert.h"
 #include "common/files/stream.h"
 #include "common/files/text_fields.h"
+#include "common/files/urdf.h"
 #include "common/scene/reduce.h"
 
 namespace hamel::files {
@@ -22,7 +23,10 @@ class Loader {
   Checked<scene::Scene> load() {
     const auto text = read_file(path_);
     if (!text) return text.error();
-    parse_text(text.value(), path_, message_, parsed_);
+    return load(text.value());
+  }
+  Checked<scene::Scene> load(const std::string& text) {
+    parse_text(text, path_, message_, parsed_);
     found_ = parsed_.problems;
     if (!parsed_.complete) return std::move(found_);
     for (const std::string& o : overrides_)
@@ -31,7 +35,7 @@ class Loader {
     SceneParts parts = to_parts(message_);
     note(parts.missing);
     read_stream(parts);
-    return assemble(std::move(parts), text.value());
+    return assemble(std::move(parts), text);
   }
 
  private:
@@ -180,6 +184,24 @@ Problems set_planner(const std::vector<std::string>& assignments, scene::Planner
   const Problems broken = scene::problems(options);
   found.insert(found.end(), broken.begin(), broken.end());
   return found;
+}
+
+Checked<scene::Scene> load_free_motion(const std::string& urdf_path,
+                                       const std::vector<std::string>& overrides) {
+  const auto robot = load_urdf(urdf_path);
+  if (!robot) return robot.error();
+  const model::Chain& chain = robot.value().chain;
+  std::string q0, file;
+  for (int i = 0; i < chain.n(); ++i) {
+    const model::JointLimits& limits = chain.joint(i).limits;
+    q0 += (i ? ", " : "") + std::to_string(std::clamp(0.5, limits.lower, limits.upper));
+  }
+  for (const char c : std::filesystem::path(urdf_path).filename().string()) {
+    if (c == '"' || c == '\\') file += '\\';
+    file += c;
+  }
+  return Loader(urdf_path, overrides)
+      .load("robot { urdf: \"" + file + "\" } q0: [" + q0 + "] steered: false stop: at_duration");
 }
 
 }  // namespace hamel::files

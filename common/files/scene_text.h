@@ -28,6 +28,12 @@ Checked<scene::Scene> read_scene(const std::string& path, const std::vector<std:
 /// and every rule the outcome violates.
 Problems set_planner(const std::vector<std::string>& assignments, scene::PlannerOptions& options);
 
+/// A plain robot as a scene: the free motion of the arm in a URDF file, from rest with every joint at 0.5 (or
+/// at its limit nearest to that) under gravity along -z, 10 s; overrides change what they like.  Else every
+/// problem.
+Checked<scene::Scene> load_free_motion(const std::string& urdf_path,
+                                       const std::vector<std::string>& overrides = {});
+
 /// A whole file, or the problem that kept it from being read (absent, a folder, no permission, over 256 MB).
 Checked<std::string> read_file(const std::string& path);
 

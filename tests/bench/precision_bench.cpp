@@ -93,7 +93,7 @@ void add(const std::string& what, const Motion& m, const Method& method, const s
          double horizon_s, const VectorXd& end, bool once) {
   const std::string title = what + " " + m.name + "/" + method.name + "/" + setting;
   auto* one = benchmark::RegisterBenchmark(title.c_str(), measure, m, method, horizon_s, end);
-  if (once) one->Iterations(1);
+  if (once) one->Iterations(1)->Repetitions(3);
 }
 
 /// The steps a method is tried with: `longest` and shorter by 10^(1/8), where they divide the horizon.

@@ -109,8 +109,6 @@ inline dynamics::Options options(Bytes& in) {
   o.max_iterations = in.upto(40);
   o.max_subdivisions = in.upto(7);
   if (in.upto(3) == 0) o.stop_stiffness = in.positive(1e4, 6);
-  // An adaptive step spends its whole budget on each part when it is divided: seconds.
-  if (o.tier == scene::Tier::dopri8) o.max_subdivisions = 0;
   return o;
 }
 
@@ -120,6 +118,38 @@ inline bool same(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return a.size() == b.size();
 }
 
+/// Now and then a wrench, a payload that may be no body, a state of other sizes.
+inline std::string load(dynamics::Integrator& integrator, dynamics::State& s, Bytes& in) {
+  const int n = integrator.chain().n();
+  if (in.upto(2) == 0) {
+    lie::Wrench F;
+    F << in.vec3(5), in.vec3(20);
+    if (F.allFinite()) integrator.set_wrench(in.upto(n - 1), F);
+  }
+  if (in.upto(3) == 0) {
+    model::Inertia body{in.positive(10, 4), in.vec3(0.3), Eigen::Matrix3d::Zero()};
+    const Eigen::Array3d a = Eigen::Array3d(in.number(1), in.number(1), in.number(1)).square();
+    body.about_com_kgm2.diagonal() << a[1] + a[2], a[0] + a[2], a[0] + a[1];
+    const dynamics::State before = s;
+    const bool refused = !integrator.set_payload(body, s).empty();
+    if (refused && !same(s.p, before.p)) return "a refused payload changed the state";
+    if (!same(s.q, before.q) || !same(s.qd, before.qd)) return "a payload moved the arm";
+  }
+  if (in.upto(31) == 0) s.q.setConstant(in.upto(2 * n), 0.1);
+  if (in.upto(31) == 0) s.history.assign(static_cast<std::size_t>(in.upto(200)), in.number(1));
+  return {};
+}
+
+/// States between two that were good are good.
+inline std::string judge_between(dynamics::Integrator& integrator, const dynamics::State& before,
+                                 const dynamics::State& after, Bytes& in) {
+  Eigen::VectorXd q = before.q, qd = before.qd;
+  integrator.between(before, after, in.byte() / 255.0, q, qd);
+  const bool small = after.q.lpNorm<Eigen::Infinity>() + before.q.lpNorm<Eigen::Infinity>() < 1e100 &&
+                     after.qd.lpNorm<Eigen::Infinity>() + before.qd.lpNorm<Eigen::Infinity>() < 1e100;
+  return small && !(q.allFinite() && qd.allFinite()) ? "a state inside a step is not finite" : "";
+}
+
 /// Two steps from whatever state: what a step returns is finite, what it refuses it leaves alone.
 inline std::string judge_steps(const model::Chain& chain, const dynamics::Options& o, Bytes& in) {
   const int n = chain.n();
@@ -127,26 +157,26 @@ inline std::string judge_steps(const model::Chain& chain, const dynamics::Option
   const Eigen::VectorXd q0 = in.vector(n, 4), qd0 = in.vector(n, 5);
   dynamics::State s = integrator.start(q0, qd0);
   if (in.upto(7) == 0) s.p = in.vector(n, 10);
+  if (const std::string broken = load(integrator, s, in); !broken.empty()) return broken;
   for (int k = 0; k < 2; ++k) {
     const Eigen::VectorXd tau = in.vector(n, 50);
     const dynamics::State before = s;
     const dynamics::StepReport report = integrator.step(s, tau);
     if (report.usable()) {
       if (!s.q.allFinite() || !s.p.allFinite() || !s.qd.allFinite()) return "a usable step is not finite";
-      const bool squares_overflow =
-          s.q.lpNorm<Eigen::Infinity>() > 1e100 || tau.lpNorm<Eigen::Infinity>() > 1e100;
-      if (squares_overflow) return {};
       if (!std::isfinite(report.work_J) || !std::isfinite(report.energy_error_J))
         return "a report is not finite";
       if (!std::isfinite(integrator.energy(s))) return "the energy of a usable state is not finite";
       if (s.step != before.step + 1) return "a step was not counted";
+      if (const std::string broken = judge_between(integrator, before, s, in); !broken.empty()) return broken;
     } else if (!same(s.q, before.q) || !same(s.p, before.p) || !same(s.qd, before.qd) ||
                s.step != before.step) {
       return "a refused step changed the state";
     }
     if (!tau.allFinite() && report.usable()) return "torque that is not finite was taken";
     const double parts = std::ldexp(2, o.max_subdivisions);
-    const double most = o.tier == scene::Tier::dopri8 ? 1e7 : parts * (o.max_iterations + 2) * 16 + 64;
+    const double most =
+        o.tier == scene::Tier::dopri8 ? 2 * 5001 * 12 + parts : parts * (o.max_iterations + 2) * 16 + 64;
     if (report.evaluations > most) return "a step cost more than its budget";
   }
   return {};

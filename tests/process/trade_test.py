@@ -9,9 +9,10 @@ import tempfile
 import time
 import unittest
 
-from programs import BIN, DEADLINE_S, hamel, main, scene
+from programs import BIN, DEADLINE_S, ROOT, hamel, main, scene
 
 SWING = scene("three_link_swing")
+ROBOT = ROOT / "deploy/robots/four_link_planar.urdf"
 
 
 def blocks_interrupts(pid):
@@ -48,6 +49,30 @@ class Trade(unittest.TestCase):
                     return [{k: v for k, v in r.items() if k != "time_s_per_s"} for r in csv.DictReader(table)]
         self.assertEqual(rows(), rows())
 
+    def test_a_plain_robot_will_do(self):
+        code, out, err = hamel("trade", ROBOT, "--quick", "--horizon", "0.5", "--set", "dynamics.dt_s=0.002")
+        self.assertEqual(code, 0, err)
+        self.assertIn("free motion of four_link_planar (4 joints) over 0.5 s", out)
+        self.assertIn("gauss-8", out)
+        self.assertNotIn("steered", out)
+
+    def test_a_steered_scene_is_told_to_be_measured_without_its_planner(self):
+        code, out, err = hamel("trade", scene("four_link_avoid"), "--quick", "--horizon", "0.5")
+        self.assertEqual(code, 0, err)
+        self.assertIn("no planner", out)
+
+    def test_wrong_files_are_named(self):
+        with tempfile.NamedTemporaryFile(suffix=".urdf") as f:
+            f.write(b"<robot name='x'><link name='a'/></robot>")
+            f.flush()
+            for path, word in ((f.name, f.name), ("absent.urdf", "absent.urdf"), ("absent.textproto", "absent.textproto"), ("/", "/")):
+                code, out, err = hamel("trade", path)
+                self.assertEqual((code, out), (2, ""), path)
+                self.assertIn(word, err)
+        code, _, err = hamel("trade", ROBOT, "--set", "q0=[1]")
+        self.assertEqual(code, 2)
+        self.assertIn("q0", err)
+
     def test_bad_input_is_two(self):
         self.assertEqual(hamel("trade", SWING, "--plot", "x.pdf")[0], 2)
         self.assertEqual(hamel("trade", SWING, "--by", "luck")[0], 2)
@@ -61,6 +86,7 @@ class Trade(unittest.TestCase):
                 pass
             p.send_signal(signal.SIGINT)
             self.assertEqual(p.wait(DEADLINE_S), 130)
+
 
 class Figures(unittest.TestCase):
     def test_figures_of_the_paper_are_drawn(self):

@@ -69,7 +69,7 @@ TYPED_TEST(Recursion, OfAStageIsLinear) {
     const double a = 0.5;
     const std::vector<double> q(size, 0.1), p(size, 0.2), inertia(size, 1), V(size, 0.3), F(size, 0.4);
     std::vector<double> V_next(size), F_next(size), applied(size);
-    std::vector<unsigned char> scratch(lane_bytes<G>(n));
+    std::vector<unsigned char> scratch(scratch_bytes<G>(n));
     StageJob<G> job;
     job.chain = &chain, job.load = &load, job.tau = load.tau.data();
     job.h = 0.01, job.stop_stiffness = 1, job.stages = job.padded = 1, job.a = &a;

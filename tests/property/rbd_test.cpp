@@ -141,6 +141,94 @@ TEST_P(Rbd, JacobiansAreSlopesOfPositions) {
   }
 }
 
+TEST_P(Rbd, BodyAndSpaceJacobiansAreOneTwistInTwoFrames) {
+  const int link = static_cast<int>(GetParam() % static_cast<unsigned>(n));
+  velocities(chain, q, qd, ws);
+  const lie::Pose X_WB = ws.X_WB[static_cast<std::size_t>(link)];
+  MatrixXd body(6, n), space(6, n), frame(6, n);
+  body_jacobian(chain, ws, link, body);
+  space_jacobian(chain, ws, link, space);
+  frame_jacobian(chain, ws, link, X_WB.p, frame);
+  EXPECT_LT((lie::Ad(X_WB) * body - space).norm(), 1e-12 * (1 + space.norm()));
+  EXPECT_LT((body * qd - ws.V_B[static_cast<std::size_t>(link)]).norm(), 1e-12 * (1 + qd.norm()));
+  EXPECT_LT((X_WB.R * body.topRows(3) - frame.topRows(3)).norm() +
+                (X_WB.R * body.bottomRows(3) - frame.bottomRows(3)).norm(),
+            1e-12 * (1 + frame.norm()));
+  EXPECT_EQ(body.rightCols(n - 1 - link).norm() + space.rightCols(n - 1 - link).norm(), 0);
+  for (int i = 0; i <= link; ++i) {  // a screw of space is the joint's own, wherever link is
+    const lie::Twist screw = lie::Ad(ws.X_WB[static_cast<std::size_t>(i)], chain.A_B(i));
+    EXPECT_LT((space.col(i) - screw).norm(), 1e-13 * (1 + screw.norm()));
+  }
+}
+
+// d/dt X = hat(J_s qd) X = X hat(J_b qd).
+TEST_P(Rbd, JacobiansAreTheVelocityOfThePose) {
+  const double e = 1e-5;
+  positions(chain, q + e * qd, ws);
+  const lie::Pose later = ws.X_WB.back();
+  positions(chain, q - e * qd, ws);
+  const lie::Pose before = ws.X_WB.back();
+  positions(chain, q, ws);
+  MatrixXd J(6, n);
+  space_jacobian(chain, ws, n - 1, J);
+  const lie::Twist space = lie::log_se3(later * inverse(before)) / (2 * e);
+  EXPECT_LT((space - J * qd).norm(), 1e-8 * (1 + space.norm()));
+  body_jacobian(chain, ws, n - 1, J);
+  const lie::Twist body = lie::log_se3(inverse(before) * later) / (2 * e);
+  EXPECT_LT((body - J * qd).norm(), 1e-8 * (1 + body.norm()));
+}
+
+TEST_P(Rbd, AWrenchWorksOnTheTwistOfItsLink) {
+  const int link = static_cast<int>(GetParam() % static_cast<unsigned>(n));
+  lie::Wrench F;
+  F << rng.vec3(2), rng.vec3(5);
+  velocities(chain, q, qd, ws);
+  MatrixXd J(6, n);
+  frame_jacobian(chain, ws, link, ws.X_WB[static_cast<std::size_t>(link)].p, J);
+  tau.setConstant(0.5);
+  add_wrench(chain, ws, link, F, tau);
+  EXPECT_LT((tau - VectorXd::Constant(n, 0.5) - J.transpose() * F).norm(), 1e-12 * (1 + tau.norm()));
+}
+
+// Power balance: dE/dt is the power of torque, wrench and damping.
+TEST_P(Rbd, PowerOfAllThatActsIsTheRateOfEnergy) {
+  model::ChainSpec spec = chain.spec();
+  for (model::Joint& joint : spec.joints) joint.damping = 0.4;
+  const model::Chain damped = test::checked(spec);
+  Workspace braked(damped);
+  lie::Wrench F;
+  F << rng.vec3(2), rng.vec3(5);
+  const VectorXd torque = rng.vector(n, 2);
+  VectorXd acting = torque;
+  positions(damped, q, braked);
+  add_wrench(damped, braked, n - 1, F, acting);
+  forward_dynamics(damped, q, qd, acting, braked, out);
+  const double e = 1e-5;
+  const auto E = [&](double t) {
+    const VectorXd v = qd + t * out, x = q + t * qd + 0.5 * t * t * out;
+    velocities(damped, x, v, braked);
+    return kinetic_energy(damped, braked, v) + potential_energy(damped, braked);
+  };
+  velocities(damped, q, qd, braked);
+  const lie::Twist& V = braked.V_B.back();
+  const Eigen::Matrix3d R = braked.X_WB.back().R;
+  const double pushed = F.head<3>().dot(R * V.head<3>()) + F.tail<3>().dot(R * V.tail<3>());
+  const double power = torque.dot(qd) + pushed - 0.4 * qd.squaredNorm();
+  EXPECT_NEAR((E(e) - E(-e)) / (2 * e), power, 1e-5 * (1 + std::abs(power) + std::abs(E(0)) + out.norm()));
+}
+
+TEST_P(Rbd, BiasIsWhatRatesAloneAskFor) {
+  bias_torque(chain, q, qd, ws, out);
+  positions(chain, q, ws);
+  gravity_torque(chain, ws, tau);
+  VectorXd both(n);
+  inverse_dynamics(chain, q, qd, VectorXd::Zero(n), ws, both);
+  EXPECT_LT((out + tau - both).norm(), 1e-12 * (1 + both.norm() + tau.norm()));
+  VectorXd doubled(n);
+  bias_torque(chain, q, 2 * qd, ws, doubled);
+  EXPECT_LT((doubled - 4 * out).norm(), 1e-12 * (1 + doubled.norm()));
+}
+
 TEST_P(Rbd, TwistsAreJacobianTimesRates) {
   velocities(chain, q, qd, ws);
   const lie::Pose X_WB = ws.X_WB.back();
@@ -184,6 +272,10 @@ TEST_P(Rbd, AllocatesNothing) {
   gravity_torque(chain, ws, tau);
   point_jacobian(chain, ws, n - 1, tip(chain, ws).p, J);
   frame_jacobian(chain, ws, n - 1, tip(chain, ws).p, J6);
+  body_jacobian(chain, ws, n - 1, J6);
+  space_jacobian(chain, ws, n - 1, J6);
+  add_wrench(chain, ws, n - 1, lie::Wrench::Ones(), tau);
+  bias_torque(chain, q, qd, ws, out);
   double sum = point_bias_acceleration(chain, ws, n - 1, tip(chain, ws).p, qd).sum();
   inverse_dynamics(chain, q, qd, qdd, ws, tau);
   forward_dynamics(chain, q, qd, tau, ws, out);

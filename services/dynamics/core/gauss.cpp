@@ -9,8 +9,6 @@
 namespace hamel::dynamics {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 int padded(int stages) { return stages <= 2 ? 2 : stages <= 4 ? 4 : 8; }
 
 /// The matrix's rows, the last repeated.
@@ -19,8 +17,6 @@ MatrixXd with_rows(const MatrixXd& a, int rows) {
   for (Eigen::Index i = 0; i < rows; ++i) b.row(i) = a.row(std::min<Eigen::Index>(i, a.rows() - 1));
   return b;
 }
-/// Damping above this share of what a joint's momentum loses in a step is taken implicitly.
-constexpr double kStiffShare = 0.02;
 
 }  // namespace
 
@@ -34,16 +30,16 @@ GaussStep<G>::GaussStep(const Chain& chain, const Options& options, Lanes lanes)
       a_(with_rows(method_.a, padded_)),
       kernel_(stage_kernel<G>(lanes)),
       contraction_(chain.n()),
+      stiff_forces_(chain, method_.a),
       x_{MatrixXd::Zero(padded_, chain.n()), MatrixXd::Zero(padded_, chain.n())},
       next_(x_),
       applied_(x_.V),
       inertia_(VectorXd::Zero(chain.n())),
       u_(inertia_),
       p_next_(inertia_),
-      scratch_(8 * lane_bytes<G>(chain.n()) + 64) {
+      scratch_(scratch_bytes<G>(chain.n()) + 64) {
   const auto start = reinterpret_cast<std::uintptr_t>(scratch_.data());
   job_.scratch = scratch_.data() + (64 - start % 64) % 64;
-  job_.lane_bytes = lane_bytes<G>(chain.n());
   job_.chain = &chain_;
   job_.stop_stiffness = options_.stop_stiffness;
   job_.stages = stages_, job_.padded = padded_;
@@ -84,51 +80,28 @@ void GaussStep<G>::guess(Stages& x) noexcept {
 
 template <class G>
 void GaussStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noexcept {
-  from_ = &from, load_ = &load, h_ = h;
+  from_ = &from, load_ = &load, h_ = h, mismatch_ = 0;
   for (int i = 0; i < chain_.n(); ++i) inertia_[i] = 1 / from.factor[at(i)].D_inv;
-  job_.load = &load, job_.tau = load.tau.data(), job_.h = h, job_.fresh = true;
+  job_.load = &load, job_.tau = load.tau.data(), job_.h = h;
   job_.q = from.q.data(), job_.p = from.p.data();
+  stiff_ = stiff_forces_.begin(from, h, options_.stop_stiffness);
 }
 
+/// What follows from x is nearer to the root than x by the rate at which the mismatch falls: the residual is
+/// what it would be there.
 template <class G>
 Residual GaussStep<G>::evaluate(const Stages& x) noexcept {
   job_.V = x.V.data(), job_.F = x.F.data();
   job_.V_next = next_.V.data(), job_.F_next = next_.F.data();
   kernel_(job_);
-  job_.fresh = false;
-  return {job_.torque_Nm, job_.relative};
-}
-
-/// A joint's damping c meets its own inertia D: where x follows from F - c V, forces that oppose the change
-/// are solved for together, (1 + (h c / D) a) dF = change.
-template <class G>
-void GaussStep<G>::soften_damping(Stages& x) noexcept {
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 8, 8>;
-  for (int i = 0; i < chain_.n(); ++i) {
-    const double share = h_ * chain_[i].damping / inertia_[i];
-    if (share <= kStiffShare) continue;
-    Small system = share * a_.topRows(stages_);
-    system.diagonal().array() += 1;
-    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 8, 1> change = (next_.F.col(i) - x.F.col(i)).head(stages_);
-    // Gauss without pivots: the matrix is the identity and more
-    for (int k = 0; k < stages_; ++k) {
-      for (int r = k + 1; r < stages_; ++r) {
-        const double l = system(r, k) / system(k, k);
-        for (int c = k; c < stages_; ++c) system(r, c) -= l * system(k, c);
-        change[r] -= l * change[k];
-      }
-    }
-    for (int k = stages_; k-- > 0;) {
-      for (int c = k + 1; c < stages_; ++c) change[k] -= system(k, c) * change[c];
-      change[k] /= system(k, k);
-    }
-    for (int j = 0; j < padded_; ++j) next_.F(j, i) = x.F(j, i) + change[std::min(j, stages_ - 1)];
-  }
+  const double rate = mismatch_ > 0 ? std::min(1.0, job_.relative / mismatch_) : 1;
+  mismatch_ = job_.relative;
+  return {job_.torque_Nm, job_.relative * rate};
 }
 
 template <class G>
 void GaussStep<G>::correct(Stages& x) noexcept {
-  soften_damping(x);
+  if (stiff_) stiff_forces_.correct(x.F, next_.F, next_.V);
   x.V.swap(next_.V);
   x.F.swap(next_.F);
 }
@@ -138,6 +111,7 @@ StepReport GaussStep<G>::advance(const Node<G>& from, const Load<G>& load, doubl
   begin(from, load, h);
   guess(x_);
   contraction_ = Contraction(chain_.n());
+  contraction_.look_no_further();
   StepReport report = find_root(*this, options_, contraction_, x_);
   if (report.iterations < report.evaluations) correct(x_);  // what follows from x is nearer to the root
   report.evaluations *= stages_;

@@ -8,17 +8,18 @@
 ///   V_i = M(Q_i)^-1 P_i,          F_i = dL/dq(Q_i, V_i) + tau - damping V_i + stops(Q_i)
 ///   q' = q + h sum b_i V_i,       p' = p + h sum b_i F_i
 /// where dL/dq_i = A_i^T (ad_{V_i}^T h_i + w_i), composite momentum and weight as in midpoint.h.
-/// Solved by fixed-point iteration, rates before configurations (Anderson's acceleration of the plain one
-/// saved 6 % of its iterations at most: left out), from the extrapolated polynomials of the last step; all
-/// stages of an iteration side by side in SIMD lanes (gauss_lanes.h); O(n) a stage.  Damping is taken
-/// implicitly in the iteration, joint by joint; where it takes a joint's momentum several times over in one
-/// step (h c / D = 3) the step is still divided.
+/// Solved by fixed-point iteration from the extrapolated polynomials of the last step (left out: Anderson's
+/// acceleration, which saved 6 % of the iterations at most; configurations from the newest rates, which saved
+/// 40 % on example 5.1 but cost more on fast arms and long chains); all stages of an iteration side by side
+/// in SIMD lanes (gauss_lanes.h); O(n) a stage.  Strong damping and stops are taken implicitly
+/// (gauss_stiff.h).
 
 #include <Eigen/Core>
 #include <vector>
 
 #include "services/dynamics/core/gauss_lanes.h"
 #include "services/dynamics/core/gauss_method.h"
+#include "services/dynamics/core/gauss_stiff.h"
 #include "services/dynamics/core/increment_root.h"
 
 namespace hamel::dynamics {
@@ -47,7 +48,6 @@ class GaussStep final : public TierStep<G> {
   void begin(const Node<G>& from, const Load<G>& load, double h) noexcept;
   void guess(Stages& x) noexcept;
   void remember(const Stages& x, Node<G>& to) const noexcept;
-  void soften_damping(Stages& x) noexcept;
 
   const Chain& chain_;
   const Options options_;
@@ -55,9 +55,11 @@ class GaussStep final : public TierStep<G> {
   const int stages_, padded_;
   const MatrixXd a_;  ///< method_.a, its last row repeated
   const StageKernel<G> kernel_;
+  StiffForces<G> stiff_forces_;
+  bool stiff_ = false;  ///< this step needs them
   const Node<G>* from_ = nullptr;
   const Load<G>* load_ = nullptr;
-  double h_ = 0;
+  double h_ = 0, mismatch_ = 0;
   Contraction contraction_;
   StageJob<G> job_;
   Stages x_, next_;

@@ -28,15 +28,13 @@ struct StageJob {
   const double* inertia = nullptr;  ///< what turns a joint's rate into momentum
   const double *V = nullptr, *F = nullptr;
   double *V_next = nullptr, *F_next = nullptr;
-  double* applied = nullptr;           ///< torque, damping, stops, wrenches: what does work
-  void* scratch = nullptr;             ///< keeps frames and factors from one evaluation to the next
-  std::size_t lane_bytes = 0;          ///< of it for each stage
-  bool fresh = true;                   ///< the first evaluation of a step: nothing was kept
+  double* applied = nullptr;  ///< torque, damping, stops, wrenches: what does work
+  void* scratch = nullptr;
   double torque_Nm = 0, relative = 0;  ///< result: Residual
 };
-/// Bytes of scratch for each stage of n joints.
+/// Bytes of scratch for n joints.
 template <class G>
-std::size_t lane_bytes(int n) noexcept;
+std::size_t scratch_bytes(int n) noexcept;
 template <class G>
 using StageKernel = void (*)(StageJob<G>& job) noexcept;
 

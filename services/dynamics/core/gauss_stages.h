@@ -17,7 +17,8 @@ struct StageScratch {
   typename G::template Attitude<P>* R;
   P *Q, *P_, *u, *rate, *push;
 
-  [[gnu::always_inline]] StageScratch(unsigned char* next, int n) {
+  [[gnu::always_inline]] StageScratch(void* memory, int n) {
+    auto* next = static_cast<unsigned char*>(memory);
     cut(next, X, n), cut(next, factor, n), cut(next, V, n), cut(next, momentum, n), cut(next, g, n),
         cut(next, R, n);
     cut(next, Q, n), cut(next, P_, n), cut(next, u, n), cut(next, rate, n), cut(next, push, n);
@@ -29,15 +30,18 @@ struct StageScratch {
   }
 };
 
-/// out = x + h a Y for the stages from `first`.
+/// Q = q + h a V and P = p + h a F for the stages from `first`.
 template <class G, class P>
-[[gnu::always_inline]] inline void gather(const StageJob<G>& job, int first, const double* x, const double* Y,
-                                          P* out) {
+[[gnu::always_inline]] inline void gather(const StageJob<G>& job, int first, const StageScratch<G, P>& w) {
   for (int i = 0; i < job.chain->n(); ++i) {
-    P sum{};
-    for (int j = 0; j < job.stages; ++j)
-      sum = sum + P::load(job.a + j * job.padded + first) * Y[i * job.padded + j];
-    out[i] = x[i] + job.h * sum;
+    P V{}, F{};
+    for (int j = 0; j < job.stages; ++j) {
+      const P a = P::load(job.a + j * job.padded + first);
+      V = V + a * job.V[i * job.padded + j];
+      F = F + a * job.F[i * job.padded + j];
+    }
+    w.Q[i] = job.q[i] + job.h * V;
+    w.P_[i] = job.p[i] + job.h * F;
   }
 }
 
@@ -48,29 +52,19 @@ template <class P>
   return push(larger(k.lower - q, P{})) - push(larger(q - k.upper, P{}));
 }
 
-/// Frames and factors at the configurations that follow from the rates V.
+/// V = M(Q)^-1 P and F = dL/dq + joint torques for the stages from `first`, and their distance from job's V,
+/// F.
 template <class G, class P>
-[[gnu::always_inline]] inline void place_bundle(const StageJob<G>& job, int first, const double* V,
-                                                const StageScratch<G, P>& w) noexcept {
-  gather(job, first, job.q, V, w.Q);
-  rbd::place(*job.chain, w.Q, w.X);
-  rbd::factorise<G, P>(*job.chain, w.X, nullptr, w.factor);
-}
-/// Rates from the forces F.
-template <class G, class P>
-[[gnu::always_inline]] inline void move_bundle(const StageJob<G>& job, int first,
-                                               const StageScratch<G, P>& w) noexcept {
-  gather(job, first, job.p, job.F, w.P_);
-  rbd::solve<G, P>(*job.chain, w.X, w.factor, w.P_, w.u, w.rate);
-  for (int i = 0; i < job.chain->n(); ++i) w.rate[i].store(job.V_next + i * job.padded + first);
-}
-/// F = dL/dq + joint torques from frames and rates, and the distance of V, F from job's.
-template <class G, class P>
-[[gnu::always_inline]] inline void push_bundle(StageJob<G>& job, int first, const StageScratch<G, P>& w,
-                                               P& torque, P& relative) noexcept {
+[[gnu::always_inline]] inline void evaluate_bundle(StageJob<G>& job, int first, P& torque,
+                                                   P& relative) noexcept {
   const auto& chain = *job.chain;
   const int n = chain.n();
+  const StageScratch<G, P> w(job.scratch, n);
+  gather(job, first, w);
+  rbd::place(chain, w.Q, w.X);
   if (job.load->pushed) rbd::wrench_torques<G, P>(chain, w.X, job.load->wrench.data(), w.R, w.push);
+  rbd::factorise<G, P>(chain, w.X, nullptr, w.factor);
+  rbd::solve<G, P>(chain, w.X, w.factor, w.P_, w.u, w.rate);
   typename G::template Direction<P> g = P::of(1) * chain.gravity_W;
   typename G::template Motion<P> V{}, H{};
   for (int i = 0; i < n; ++i) {
@@ -92,6 +86,7 @@ template <class G, class P>
     if (job.stop_stiffness > 0) applied = applied + stop_torque(k, job.stop_stiffness, w.Q[i]);
     const P F = coadjoint_along(k, X, w.V[i], H) + weight_along(k, X, moment, w.g[i]) + applied;
     applied.store(job.applied + at);
+    w.rate[i].store(job.V_next + at);
     F.store(job.F_next + at);
     // mismatch and scale as momenta: a rate counts with the inertia it moves
     const P off =
@@ -107,24 +102,10 @@ template <class G, class P>
   }
 }
 
-/// One iteration.  Rates come first, by the mass matrices of the iteration before, and carry the
-/// configurations with them: where they hardly turn the mass matrix that gains two orders of h a time instead
-/// of one.
 template <class G, class P>
 [[gnu::always_inline]] inline void evaluate_stages(StageJob<G>& job) noexcept {
-  const auto bundle = [&](int first) {  // each has its own part of the memory
-    auto* memory = static_cast<unsigned char*>(job.scratch);
-    return StageScratch<G, P>(memory + static_cast<std::size_t>(first) * job.lane_bytes, job.chain->n());
-  };
   P torque{}, relative{};
-  if (job.fresh) {
-    for (int i = 0; i < job.padded; i += P::kWidth) place_bundle(job, i, job.V, bundle(i));
-  }
-  for (int i = 0; i < job.padded; i += P::kWidth) move_bundle(job, i, bundle(i));
-  if (!job.fresh) {
-    for (int i = 0; i < job.padded; i += P::kWidth) place_bundle(job, i, job.V_next, bundle(i));
-  }
-  for (int i = 0; i < job.padded; i += P::kWidth) push_bundle(job, i, bundle(i), torque, relative);
+  for (int first = 0; first < job.padded; first += P::kWidth) evaluate_bundle(job, first, torque, relative);
   double t[P::kWidth], r[P::kWidth];
   torque.store(t), relative.store(r);
   job.torque_Nm = t[0], job.relative = r[0];

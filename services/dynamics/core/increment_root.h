@@ -89,9 +89,9 @@ struct Residual {
 
 /// Relative residual that counts as rounding for a few links; sums along many links round more.
 inline constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
-/// Relative residual below which an update that gains much less than others did means that rounding is
+/// So many roundings from the end, an update that gains much less than others did means that rounding is
 /// reached: it left more than kIdle, and kWorse times what the best one left ...
-inline constexpr double kFloor = 1e-11;
+inline constexpr double kFloor = 500;
 inline constexpr double kIdle = 0.3, kWorse = 4;
 /// ... and below which several updates in a row without progress do: slow convergence is not stagnation.
 inline constexpr double kHighFloor = 1e-9;
@@ -114,13 +114,17 @@ class Contraction {
     }
     last_ = relative;
   }
+  /// For an equation whose residual is already what the next update leaves.
+  void look_no_further() noexcept { least_ = std::numeric_limits<double>::infinity(); }
   /// From now on updates are made by an exact Jacobian: what others left says nothing.
   void sharpen() noexcept { rate_ = seen_ = 0, known_ = true, least_ = kLeastExact; }
   /// 0: not known.
   double rate() const noexcept { return rate_; }
   /// The largest in this step; 0: none was seen.
   double seen() const noexcept { return seen_; }
-  bool done() const noexcept { return last_ <= rounding_; }
+  bool done() const noexcept { return within(1); }
+  /// So many roundings from the end.
+  bool within(double roundings) const noexcept { return last_ <= roundings * rounding_; }
   /// One more update leaves nothing to see.
   bool ends_next() const noexcept {
     return known_ && rate_ > 0 && rate_ < 1 && last_ * std::max(rate_, least_) <= rounding_;
@@ -165,7 +169,7 @@ StepReport find_root(Equation& equation, const Options& options, Contraction& co
       first = r.relative;
     } else {
       const double rate = r.relative / last;
-      if (r.relative < kFloor && rate > kIdle && rate > kWorse * best_rate) {
+      if (contraction.within(kFloor) && rate > kIdle && rate > kWorse * best_rate) {
         report.stop = Stop::stagnated;
         return report;
       }

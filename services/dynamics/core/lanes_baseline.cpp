@@ -15,12 +15,12 @@ void stages_baseline(StageJob<G>& job) noexcept {
 }
 template <class T>
 std::size_t room(int n) {
-  return (static_cast<std::size_t>(n) * sizeof(T) + 127) / 64 * 64;
+  return (8 * static_cast<std::size_t>(n) * sizeof(T) + 127) / 64 * 64;
 }
 }  // namespace
 
 template <class G>
-std::size_t lane_bytes(int n) noexcept {
+std::size_t scratch_bytes(int n) noexcept {
   return room<typename G::template Frame<double>>(n) + room<rbd::Factor<G, double>>(n) +
          2 * room<typename G::template Motion<double>>(n) + room<typename G::template Direction<double>>(n) +
          room<typename G::template Attitude<double>>(n) + 5 * room<double>(n);
@@ -46,8 +46,8 @@ StageKernel<G> stage_kernel(Lanes lanes) noexcept {
 }
 #endif
 
-template std::size_t lane_bytes<SE3>(int) noexcept;
-template std::size_t lane_bytes<SE2>(int) noexcept;
+template std::size_t scratch_bytes<SE3>(int) noexcept;
+template std::size_t scratch_bytes<SE2>(int) noexcept;
 template StageKernel<SE3> stage_kernel<SE3>(Lanes) noexcept;
 template StageKernel<SE2> stage_kernel<SE2>(Lanes) noexcept;
 

@@ -11,10 +11,8 @@ namespace {
 /// Implicit damping and stops up to this share of a joint's inertia are left to the iteration; above it the
 /// mass matrix is factorised with them, once more a step.
 constexpr double kExtraShare = 0.02;
-
 /// Relative residual above which what a residual is measured by is not known yet.
 constexpr double kFarOff = 1e-3;
-
 /// A Jacobian that leaves more of the residual is made anew.
 constexpr double kStale = 0.01;
 /// Updates by feedback that cost more than the exact Jacobian and the updates it needs.
@@ -24,8 +22,6 @@ constexpr int kWorthNewton = 4;
 constexpr double kResolved = 0.25;
 /// After some steps by Newton feedback is tried again; a rate not seen for some steps is looked at again.
 constexpr double kForget = 0.9, kAge = 1.25;
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// Torque of damping and stops.
 double resistance(const rbd::JointNumbers& k, double rate, double stiffness, double q) {

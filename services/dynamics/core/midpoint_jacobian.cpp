@@ -12,7 +12,7 @@ using Motion = rbd::Half6<double>;
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// Twist and turn, or momentum and moment, of a link in the axes that do not turn.
-Column<8> level(const Mat3<double>& R, const Motion& h, const Vec3<double>& m) {
+[[gnu::always_inline]] inline Column<8> level(const Mat3<double>& R, const Motion& h, const Vec3<double>& m) {
   const Vec3<double> a = R * h.a, l = R * h.l;
   return {a.x,
           a.y,
@@ -25,7 +25,8 @@ Column<8> level(const Mat3<double>& R, const Motion& h, const Vec3<double>& m) {
 }
 
 /// Adds the inertia of a link.
-void add_inertia(const lie::Sym3<double>& I, const Vec3<double>& h, double mass, JointRow<SE3>::Matrix& P) {
+[[gnu::always_inline]] inline void add_inertia(const lie::Sym3<double>& I, const Vec3<double>& h, double mass,
+                                               JointRow<SE3>::Matrix& P) {
   const double rows[6][6] = {{I.xx, I.xy, I.xz, 0, -h.z, h.y}, {I.xy, I.yy, I.yz, h.z, 0, -h.x},
                              {I.xz, I.yz, I.zz, -h.y, h.x, 0}, {0, h.z, -h.y, mass, 0, 0},
                              {-h.z, 0, h.x, 0, mass, 0},       {h.y, -h.x, 0, 0, 0, mass}};

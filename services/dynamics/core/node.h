@@ -11,6 +11,10 @@ namespace hamel::dynamics {
 using Eigen::VectorXd;
 using rbd::SE2;
 using rbd::SE3;
+
+/// A joint's or stage's number as the index of a std::vector.
+inline std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
 template <class G>
 using Frames = std::vector<typename G::template Frame<double>>;
 template <class G>

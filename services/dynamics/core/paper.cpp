@@ -6,9 +6,6 @@
 #include "services/dynamics/core/rounding.h"
 
 namespace hamel::dynamics {
-namespace {
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-}  // namespace
 
 template <class G>
 PaperStep<G>::PaperStep(const Chain& chain, const Options& options)

@@ -1,0 +1,68 @@
+"""The laws of the dynamics, and for each a wrong sign that its test must see.
+
+file, old, new: one place of the source; test, filter: who must fail.
+"""
+
+from typing import NamedTuple
+
+
+class Mutant(NamedTuple):
+    name: str
+    law: str
+    file: str
+    old: str
+    new: str
+    test: str
+    filter: str
+
+
+CORE = "services/dynamics/core/"
+MUTANTS = [
+    Mutant("dexp_turns_back", "dexp is the slope of exp", "common/lie/so3.h", "Identity() + cosc(x) * W + sinc3(x)",
+           "Identity() - cosc(x) * W + sinc3(x)", "lie_accuracy_test", "*Rotations*"),
+    Mutant("coupling_of_rigid_dexp", "dexp of SE(3) to 8 eps", "common/lie/se3.h", "- 3 * WPW)", "+ 3 * WPW)",
+           "lie_accuracy_test", "*RigidMotions*"),
+    Mutant("log_of_the_plane", "log undoes exp on SE(2)", "common/lie/se2.h", "* X.p - 0.5 * t * quarter_turn(X.p)",
+           "* X.p + 0.5 * t * quarter_turn(X.p)", "lie_accuracy_test", "*PlanarMotions*"),
+    Mutant("coadjoint", "inverse dynamics is Lagrange's", "common/rbd/spatial.h", "return {cross(F.a, V.a) + cross(F.l, V.l), cross(F.l, V.a)};",
+           "return {cross(F.a, V.a) - cross(F.l, V.l), cross(F.l, V.a)};", "rbd_test", "*Lagranges*"),
+    Mutant("weight_pulls_up", "gravity torque is the slope of U", "common/rbd/kinematics.cpp", "tau_g[i] = -chain.A_B(i).dot(W);",
+           "tau_g[i] = chain.A_B(i).dot(W);", "rbd_test", "*GravityTorque*"),
+    Mutant("bias_without_circling", "Jdot qd is the slope of velocity", "common/rbd/kinematics.cpp", "+ w.cross(v_point))",
+           "- w.cross(v_point))", "rbd_test", "*BiasAcceleration*"),
+    Mutant("wrench_backwards", "power balance", "common/rbd/kinematics.cpp", "tau[i] += chain.A_B(i).dot(F);",
+           "tau[i] -= chain.A_B(i).dot(F);", "rbd_test", "*PowerOfAll*"),
+    Mutant("screw_frames", "screws build the same arm", "common/model/screws.cpp", "(X_B0L.p - X_B0B.p)", "(X_B0B.p - X_B0L.p)",
+           "screws_test", "*SameArm*"),
+    Mutant("legendre_at_the_end", "the midpoint step is symplectic", CORE + "midpoint.cpp", "p_next_[i] = p + turn + push;",
+           "p_next_[i] = p - turn + push;", "variational_test", "*Symplectic*"),
+    Mutant("force_at_the_end", "forces cost no order", CORE + "midpoint.cpp", "p_next_[i] = p + turn + push;", "p_next_[i] = p + turn;",
+           "orders_test", "*Richardson*"),
+    Mutant("damping_by_old_rate", "dense and discrete forces do the work", CORE + "rivals.cpp", "power += (tau_[i] - chain_[i].damping",
+           "power += (tau_[i] + chain_[i].damping", "variational_test", "*WorkIs*"),
+    Mutant("gauss_matrix", "every gauss is symplectic", CORE + "gauss_method.cpp", "a(i, j) = static_cast<double>(integral);",
+           "a(i, j) = static_cast<double>(integral) * (i == 0 ? 0.999 : 1);", "variational_test", "*StepIsSymplectic*"),
+    Mutant("gauss_turn", "gauss of one stage is midpoint", CORE + "gauss_stages.h", "coadjoint_along(k, X, w.V[i], H) + weight_along",
+           "coadjoint_along(k, X, w.V[i], H) - weight_along", "variational_test", "*GaussOfOneStage*"),
+    Mutant("stiff_damping", "damping of any strength in one step", CORE + "gauss_stiff.cpp", "= mode.lambda * c +", "= -mode.lambda * c +",
+           "extremes_test", "Damping*"),
+    Mutant("runge_kutta_weights", "order 4", CORE + "rivals.cpp", "1. / 3, 1. / 3, 1. / 6}", "1. / 3, 1. / 6, 1. / 3}",
+           "orders_test", "*Richardson*"),
+    Mutant("prince_dormand_digit", "conditions of order 8", CORE + "dopri8.cpp", "0.0542937341165687622380535766363",
+           "0.0542937341175687622380535766363", "dopri8_test", "*OrderEight*"),
+    Mutant("papers_past", "Eq. (13) is the paper's", CORE + "paper.cpp", "(sign * share * h_) * coadjoint", "(-sign * share * h_) * coadjoint",
+           "loads_test", "*DiscreteInverse*"),
+    Mutant("forgotten_history", "2N steps = N, save, load, N", CORE + "marcher.cpp",
+           "std::copy_n(s.history.begin(), own, now_.history.begin());", "", "integrator_robustness_test", "*ResumesBitForBit*"),
+    Mutant("ledger_forgets", "the report's ledger sums", CORE + "marcher.cpp", "ledger_.made_up += made_up;", "ledger_.made_up = made_up;",
+           "loads_test", "*WorkOfAll*"),
+    Mutant("infinite_work", "no number that is none", CORE + "marcher.cpp", "if (!std::isfinite(in_play) || !std::isfinite(made_up)) return false;",
+           "", "integrator_robustness_test", "Torque*"),
+    Mutant("planar_axis", "planar is spatial", "common/rbd/planar_chain.cpp", "axis.z() < 0 ? -1 : 1", "axis.z() < 0 ? 1 : 1", "planar_test", "*Moves*"),
+    Mutant("effort_ignored", "torque is cut at the limit", CORE + "integrator.cpp", "std::clamp(tau[i], -effort, effort)", "tau[i]",
+           "integrator_robustness_test", "Limits*"),
+    Mutant("stiffer_stops", "stops are no stiffer than said", CORE + "tier.h", "e > 0 ? stiffness * (1 - r * r)", "e > 0 ? stiffness * (1 + r * r)",
+           "integrator_robustness_test", "Stops*"),
+    Mutant("potential_upside_down", "work is the change of energy", CORE + "node.cpp", "chain.potential_offset - dot(", "chain.potential_offset + dot(",
+           "variational_test", "*WorkIs*"),
+]

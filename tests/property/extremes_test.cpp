@@ -1,0 +1,222 @@
+// Models, states and steps at the edge: every tier either keeps a stated bound on its energy, or refuses for
+// a reason that is allowed.  Linear in the chain's length; heavy damping at any step.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/rbd/rbd.h"
+#include "services/dynamics/core/integrator.h"
+#include "tests/support/chains.h"
+#include "tests/support/tiers.h"
+
+namespace hamel::dynamics {
+namespace {
+
+using Eigen::VectorXd;
+
+struct Extreme {
+  const char* name;
+  model::ChainSpec spec;
+  double angle, rate, dt_s;
+  int steps = 100;
+  double kept = 1e-3;  ///< energy error of the variational tiers, of the energy in play
+};
+void PrintTo(const Extreme& e, std::ostream* out) { *out << e.name; }
+
+model::ChainSpec with_masses(double first, double last) {
+  model::ChainSpec spec = test::planar(3, 1, 0.5, 0.05);
+  for (const auto& [link, mass] : {std::pair{0, first}, std::pair{2, last}}) {
+    model::Inertia& body = spec.links[static_cast<std::size_t>(link)].inertia;
+    body.mass_kg *= mass, body.about_com_kgm2 *= mass;
+  }
+  return spec;
+}
+/// Slender rods: no inertia to speak of about their own axis, which joint 3 turns about.
+model::ChainSpec needles() {
+  model::ChainSpec spec = test::planar(3, 1, 0.5, 0.02);
+  for (model::Link& link : spec.links)
+    link.inertia.about_com_kgm2 = Eigen::Vector3d(1e-9, 0.02, 0.02 + 0.5e-9).asDiagonal();
+  spec.joints[1].axis = Eigen::Vector3d::UnitY();
+  spec.joints[2].axis = Eigen::Vector3d::UnitX();
+  return spec;
+}
+model::ChainSpec of_zero_length() {
+  model::ChainSpec spec = test::planar(3, 1, 0, 0.05);
+  spec.joints[1].axis = Eigen::Vector3d::UnitX();
+  spec.joints[2].axis = Eigen::Vector3d::UnitY();
+  return spec;
+}
+model::ChainSpec slides() {
+  model::ChainSpec spec = test::planar(3, 1, 0.5, 0.05);
+  for (model::Joint& joint : spec.joints) joint.kind = model::JointKind::prismatic;
+  spec.joints[0].axis = Eigen::Vector3d::UnitX(), spec.joints[1].axis = Eigen::Vector3d::UnitY();
+  return spec;
+}
+
+const Extreme kExtremes[] = {
+    {"light_tip", with_masses(1, 1e-6), 0.3, 0, 1e-3, 500},
+    {"heavy_base", with_masses(1e6, 1), 0.3, 0, 1e-3, 500},
+    {"inertia_1e_9", test::planar(3, 1e-6, 1e-2, 1e-9), 0.4, 1, 1e-4},
+    {"links_of_1e_4_m", test::planar(3, 1e-3, 1e-4, 1e-9), 0.4, 1, 1e-4},
+    {"links_of_1e3_m", test::planar(3, 1e3, 1e3, 1e8), 0.4, 0.1, 1e-2},
+    {"rates_of_1e3", test::planar(3, 1, 0.1, 0.01), 0.4, 1e3, 1e-5},
+    {"step_of_1e_7_s", test::planar(3, 1, 0.5, 0.1), 0.4, 1, 1e-7},
+    {"step_of_1_s", test::planar(3, 1, 0.1, 1), 0.4, 0.01, 1, 30, 0.1},
+    {"wound_to_1e6", test::planar(3, 1, 0.1, 1), 1e6, 1, 1e-2},
+    {"needles", needles(), 0.3, 0.5, 1e-4},
+    {"links_of_zero_length", of_zero_length(), 0.3, 1, 1e-3},
+    {"slides", slides(), 0.3, 1, 1e-2},
+};
+
+class Extremes : public testing::TestWithParam<Extreme> {};
+INSTANTIATE_TEST_SUITE_P(Property, Extremes, testing::ValuesIn(kExtremes),
+                         [](const auto& row) { return row.param.name; });
+
+/// Every tier and root; the explicit and the paper's own may lose more.
+const std::pair<Options, double> kEvery[] = {{{.tier = Tier::midpoint, .root = Root::feedback}, 1},
+                                             {{.tier = Tier::midpoint, .root = Root::newton}, 1},
+                                             {{.tier = Tier::gauss, .stages = 2}, 1},
+                                             {{.tier = Tier::gauss, .stages = 8}, 1},
+                                             {{.tier = Tier::rk4}, 10},
+                                             {{.tier = Tier::dopri8}, 1},
+                                             {{.tier = Tier::hamel, .root = Root::feedback}, 300},
+                                             {{.tier = Tier::hamel, .root = Root::newton}, 300},
+                                             {{.tier = Tier::semi_implicit_euler}, 300}};
+
+TEST_P(Extremes, IntegratesWithinItsBound) {
+  const Extreme& e = GetParam();
+  const model::Chain chain = test::checked(e.spec);
+  for (auto [options, slack] : kEvery) {
+    options.dt_s = e.dt_s;
+    Integrator integrator(chain, options);
+    State s = integrator.start(Eigen::Vector3d(e.angle, e.angle - 0.7, e.angle + 0.3),
+                               VectorXd::Constant(3, e.rate));
+    const double E0 = integrator.energy(s), in_play = 0.5 * s.p.dot(s.qd) + rbd::energy_scale(chain);
+    double worst = 0;
+    for (int k = 0; k < e.steps; ++k) {
+      const StepReport report = integrator.step(s, VectorXd::Zero(3));
+      ASSERT_TRUE(report.usable()) << test::name(options.tier) << " step " << k << " stop "
+                                   << static_cast<int>(report.stop) << " residual " << report.residual_Nm;
+      worst = std::max(worst, std::abs(integrator.energy(s) - E0) / in_play);
+    }
+    EXPECT_LT(worst, std::min(e.kept * slack, 1.0)) << test::name(options.tier) << options.stages;
+  }
+}
+
+TEST(MassRatio, OfAMillionEitherWay) {
+  for (const double ratio : {1e-6, 1e6}) {
+    model::ChainSpec spec = test::planar(2, 1, 0.5, 0.05);
+    spec.links[1].inertia.mass_kg *= ratio;
+    spec.links[1].inertia.about_com_kgm2 *= ratio;
+    const model::Chain chain = test::checked(spec);
+    Integrator integrator(chain, {.dt_s = 1e-3});
+    State s = integrator.start(VectorXd::Constant(2, 0.3), VectorXd::Zero(2));
+    const double E0 = integrator.energy(s);
+    for (int k = 0; k < 2000; ++k)
+      ASSERT_TRUE(integrator.step(s, VectorXd::Zero(2)).usable()) << ratio << " " << k;
+    EXPECT_LT(std::abs(integrator.energy(s) - E0), 1e-4 * rbd::energy_scale(chain));
+  }
+}
+
+// Two light links before a heavy one are thrown round in microseconds when the arm is stretched, at 0.255 s:
+// a collision but for the name.  The adaptive tier follows it; the others keep their energy up to there and
+// then refuse.
+TEST(MassRatio, WhipIsFollowedOrRefused) {
+  const model::Chain chain = test::checked(with_masses(1, 1e6));
+  for (const Tier tier : {Tier::midpoint, Tier::gauss, Tier::dopri8}) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = 1e-3});
+    State s = integrator.start(Eigen::Vector3d(0.3, -0.4, 0.6), VectorXd::Zero(3));
+    const double E0 = integrator.energy(s), scale = rbd::energy_scale(chain);
+    int usable = 0;
+    while (usable < 500 && integrator.step(s, VectorXd::Zero(3)).usable()) ++usable;
+    EXPECT_GE(usable, tier == Tier::dopri8 ? 500 : 250) << test::name(tier);
+    EXPECT_LT(std::abs(integrator.energy(s) - E0), 1e-3 * scale) << test::name(tier);
+  }
+}
+
+TEST(Winding, ChangesNothing) {
+  const model::Chain chain = test::paper_5_1();
+  Integrator integrator(chain, {.dt_s = 1e-2});
+  const double turns = 2 * M_PI * 159155;
+  State near = integrator.start(VectorXd::Constant(3, 0.4), VectorXd::Zero(3));
+  State far = integrator.start(VectorXd::Constant(3, 0.4 + turns), VectorXd::Zero(3));
+  for (int k = 0; k < 500; ++k) {
+    ASSERT_TRUE(integrator.step(near, VectorXd::Zero(3)).usable());
+    ASSERT_TRUE(integrator.step(far, VectorXd::Zero(3)).usable());
+  }
+  EXPECT_LT(((far.q.array() - turns).matrix() - near.q).norm(), 1e-6);
+}
+
+// Damping that takes the momentum thousands of times over in one step: implicit tiers take the step whole,
+// and all give the same creeping motion.
+TEST(Damping, OfAnyStrengthIsTakenInOneStep) {
+  for (const double c : {1.0, 10.0, 100.0, 1e3}) {
+    model::ChainSpec spec = test::planar(3, 1, 0.5, 0.02);
+    for (model::Joint& j : spec.joints) j.damping = c;
+    const model::Chain chain = test::checked(spec);
+    const auto creep = [&](Options options, double dt_s, int steps) {
+      options.dt_s = dt_s;
+      Integrator integrator(chain, options);
+      State s = integrator.start(VectorXd::Zero(3), VectorXd::Zero(3));
+      for (int k = 0; k < steps; ++k) {
+        const StepReport report = integrator.step(s, VectorXd::Zero(3));
+        EXPECT_TRUE(report.usable() && report.substeps == 1)
+            << test::name(options.tier) << options.stages << " c " << c;
+      }
+      return s.q;
+    };
+    const VectorXd truth = creep({.tier = Tier::gauss, .stages = 3}, 1e-3, 1000);
+    for (const double dt_s : {0.01, 0.1}) {
+      const int steps = static_cast<int>(std::lround(1 / dt_s));
+      for (const Root root : {Root::feedback, Root::newton})
+        EXPECT_LT((creep({.tier = Tier::midpoint, .root = root}, dt_s, steps) - truth).norm(),
+                  0.3 * dt_s + 1e-3)
+            << c;
+      for (const int stages : {1, 2, 3, 4, 6})
+        EXPECT_LT((creep({.tier = Tier::gauss, .stages = stages}, dt_s, steps) - truth).norm(),
+                  0.3 * dt_s + 1e-3)
+            << c << " stages " << stages;
+    }
+  }
+}
+
+// A free joint under constant torque is integrated without error, at any step.
+TEST(Prismatic, SlideFallsByTheBook) {
+  model::ChainSpec spec = test::planar(1, 2, 0, 1);
+  spec.joints[0].kind = model::JointKind::prismatic;
+  spec.joints[0].axis = Eigen::Vector3d::UnitY();
+  const model::Chain chain = test::checked(spec);
+  for (const Tier tier : {Tier::midpoint, Tier::gauss, Tier::rk4, Tier::dopri8}) {
+    Integrator integrator(chain, {.tier = tier, .dt_s = 0.1});
+    State s = integrator.start(VectorXd::Zero(1), VectorXd::Constant(1, 3));
+    for (int k = 0; k < 10; ++k) ASSERT_TRUE(integrator.step(s, VectorXd::Constant(1, 4)).usable());
+    EXPECT_NEAR(s.q[0], 3 + 0.5 * (4. / 2 - 9.81), 1e-13) << test::name(tier);
+    EXPECT_NEAR(s.qd[0], 3 + (4. / 2 - 9.81), 1e-13) << test::name(tier);
+  }
+}
+
+TEST(Linear, EvaluationsDoNotGrowWithTheChain) {
+  for (const int n : {3, 30, 300, 1000}) {
+    const model::Chain chain = test::checked(test::planar(n, 1.0 / n, 1.0 / n, 1e-2 / n));
+    for (const Space space : {Space::automatic, Space::se3}) {
+      for (const Root root : {Root::feedback, Root::newton}) {
+        Integrator integrator(chain, {.dt_s = 1e-4, .root = root, .space = space});
+        State s = integrator.start(VectorXd::Zero(n), VectorXd::Zero(n));
+        const double E0 = integrator.energy(s);
+        int worst = 0;
+        for (int k = 0; k < 20; ++k) {
+          const StepReport report = integrator.step(s, VectorXd::Zero(n));
+          ASSERT_TRUE(report.usable()) << n << " joints, step " << k;
+          worst = std::max(worst, report.evaluations);
+        }
+        // the other root and SE(3) took six once
+        EXPECT_LE(worst, space == Space::automatic && root == Root::feedback ? 5 : 6) << n << " joints";
+        EXPECT_LT(std::abs(integrator.energy(s) - E0), 1e-6 * rbd::energy_scale(chain)) << n << " joints";
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hamel::dynamics
