@@ -38,7 +38,7 @@ std::vector<Options> everything() {
     for (const Tier tier : {Tier::semi_implicit_euler, Tier::rk4, Tier::dopri8})
       all.push_back({.tier = tier, .space = space});
     for (const Tier tier : {Tier::hamel, Tier::midpoint})
-      for (const Root root : {Root::feedback, Root::newton})
+      for (const Root root : {Root::feedback, Root::newton, Root::automatic})
         for (const Start start : {Start::extrapolated, Start::previous})
           all.push_back({.tier = tier, .root = root, .start = start, .space = space});
     for (int stages = 1; stages <= 8; ++stages)

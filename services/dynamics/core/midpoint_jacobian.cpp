@@ -9,8 +9,6 @@ using lie::Vec2;
 using lie::Vec3;
 using Motion = rbd::Half6<double>;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 /// Twist and turn, or momentum and moment, of a link in the axes that do not turn.
 [[gnu::always_inline]] inline Column<8> level(const Mat3<double>& R, const Motion& h, const Vec3<double>& m) {
   const Vec3<double> a = R * h.a, l = R * h.l;
