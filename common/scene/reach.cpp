@@ -140,14 +140,14 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
   rbd::positions(chain_, q, ws_);
   const std::size_t m = bodies_.size();
   near_m_.assign(set.size() * m, inf);
-  std::vector<double> nearest(static_cast<std::size_t>(chain_.n()), inf);
+  nearest_m_.assign(static_cast<std::size_t>(chain_.n()), inf);
   for (std::size_t b = 0; b < m; ++b) {
     const auto link = static_cast<std::size_t>(bodies_[b].link);
     const geometry::Capsule c = ws_.X_WB[link] * bodies_[b].capsule_B;
     for (std::size_t k = 0; k < set.size(); ++k) {
       if (!stands(set[k])) continue;
       near_m_[k * m + b] = geometry::closest(c, set[k].shape, set[k].X_WO).distance_m;
-      nearest[link] = std::min(nearest[link], near_m_[k * m + b]);
+      nearest_m_[link] = std::min(nearest_m_[link], near_m_[k * m + b]);
     }
   }
   kept.clear();
@@ -155,7 +155,7 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
     const double grown = grows_m(set[k], 0);
     bool matters = !stands(set[k]) || may_cover_target(set[k], kSlack_m, grown);
     for (std::size_t b = 0; b < m && !matters; ++b) {
-      const double most = std::max(rho0_m_ + grown, nearest[static_cast<std::size_t>(bodies_[b].link)]);
+      const double most = std::max(rho0_m_ + grown, nearest_m_[static_cast<std::size_t>(bodies_[b].link)]);
       matters = !(near_m_[k * m + b] > most + 2 * kNear_m + kSlack_m);
     }
     if (matters) kept.push_back(set[k]);

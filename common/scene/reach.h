@@ -67,7 +67,7 @@ class Reach {
   model::Chain chain_;
   rbd::Workspace ws_;
   Eigen::VectorXd q_near_, lever_m_;  ///< where the last sift_near() was; how far each joint moves the arm
-  std::vector<double> near_m_;        ///< scratch: distances of bodies and obstacles
+  std::vector<double> near_m_, nearest_m_;  ///< scratch: distances of bodies and obstacles, least of links
   double rho0_m_ = 0, margin_m_ = 0, assumed_speed_mps_ = 0;
 };
 

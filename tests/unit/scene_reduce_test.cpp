@@ -22,6 +22,10 @@ const Reduction& find(const Scene& s, const std::string& name) {
   throw std::out_of_range(name);
 }
 
+bool holds(const std::vector<geometry::Obstacle>& set, std::uint32_t id) {
+  return std::any_of(set.begin(), set.end(), [&](const geometry::Obstacle& o) { return o.id == id; });
+}
+
 class Reduced : public test::ForSeed {};
 INSTANTIATE_TEST_SUITE_P(Scene, Reduced, testing::Range(0u, 60u));
 
@@ -165,19 +169,21 @@ TEST_P(Reduced, WhatIsCulledNeverMatters) {
       if (s.robot.chain.joint(i).kind == model::JointKind::prismatic) q[i] *= 0.15;
     rbd::positions(s.robot.chain, q, ws);
     const double age_s = rng.uniform(0, horizon_s);
+    std::vector<double> nearest_kept(floor_m.size(), kInf), nearest_culled(floor_m.size(), kInf);
     for (const LinkShape& shape : s.robot.shapes) {
       const auto link = static_cast<std::size_t>(shape.link);
       const geometry::Capsule c = (ws.X_WB[link] * shape.X_LS) * geometry::enclosing_capsule(shape.shape);
-      double nearest_kept = kInf, nearest_culled = kInf;
       for (geometry::Obstacle o : set) {
-        const bool in = std::any_of(kept.begin(), kept.end(), [&](const auto& x) { return x.id == o.id; });
+        double& nearest = (holds(kept, o.id) ? nearest_kept : nearest_culled)[link];
         o.X_WO.p += age_s * o.V_WO.tail<3>();
         const double d = geometry::closest(c, o.shape, o.X_WO).distance_m;
-        (in ? nearest_kept : nearest_culled) = std::min(in ? nearest_kept : nearest_culled, d);
+        nearest = std::min(nearest, d);
         EXPECT_GE(d - 2 * o.sigma_m, floor_m[link] - 1e-12);
       }
-      EXPECT_GT(nearest_culled, s.planner.rho0_m);
-      EXPECT_GE(nearest_culled, nearest_kept);
+    }
+    for (std::size_t link = 0; link < floor_m.size(); ++link) {
+      EXPECT_GT(nearest_culled[link], s.planner.rho0_m);
+      EXPECT_GE(nearest_culled[link], nearest_kept[link]);
     }
   }
 }
@@ -197,19 +203,22 @@ TEST_P(Reduced, WhatIsDroppedNearAConfigurationDoesNotMatterThere) {
       const VectorXd now = q + rng.vector(n, 0.1);
       if (!reach.stays_near(now)) continue;
       rbd::positions(s.robot.chain, now, ws);
+      std::vector<double> nearest_kept(static_cast<std::size_t>(n), kInf), nearest_culled = nearest_kept;
       for (const LinkShape& shape : s.robot.shapes) {
-        const geometry::Capsule c = (ws.X_WB[static_cast<std::size_t>(shape.link)] * shape.X_LS) *
-                                    geometry::enclosing_capsule(shape.shape);
-        double nearest = kInf;
-        for (const auto& o : kept)
-          nearest = std::min(nearest, geometry::closest(c, o.shape, o.X_WO).distance_m);
+        const auto link = static_cast<std::size_t>(shape.link);
+        const geometry::Capsule c = (ws.X_WB[link] * shape.X_LS) * geometry::enclosing_capsule(shape.shape);
         for (const auto& o : set) {
-          if (std::any_of(kept.begin(), kept.end(), [&](const auto& x) { return x.id == o.id; })) continue;
+          const bool in = holds(kept, o.id);
           const double d = geometry::closest(c, o.shape, o.X_WO).distance_m;
-          EXPECT_GT(d, s.planner.rho0_m + 2 * o.sigma_m);
-          EXPECT_GE(d, nearest);
+          double& nearest = (in ? nearest_kept : nearest_culled)[link];
+          nearest = std::min(nearest, d);
+          if (!in) {
+            EXPECT_GT(d, s.planner.rho0_m + 2 * o.sigma_m);
+          }
         }
       }
+      for (std::size_t link = 0; link < nearest_kept.size(); ++link)
+        EXPECT_GE(nearest_culled[link], nearest_kept[link]);
     }
   }
 }
