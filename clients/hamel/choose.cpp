@@ -15,9 +15,10 @@ namespace {
 using scene::Tier;
 using trade::kSamples;
 
-constexpr int kHalvings = 5;      // of a steered reference's step
-constexpr double kBetween = 2;    // an error between two instants, of the largest at one
-constexpr double kCycle_us = 12;  // one planner cycle
+constexpr int kHalvings = 5;         // of a steered reference's step
+constexpr double kBetween = 2;       // an error between two instants, of the largest at one
+constexpr double kRounding = 1e-13;  // what a run adds up to [rad or m], at the least
+constexpr double kCycle_us = 12;     // one planner cycle
 constexpr double kShortRun_s = 0.05;
 
 /// What an evaluation usually takes [us]: a fixed part and one for each joint, measured on one core.
@@ -170,7 +171,7 @@ Setting measure(const scene::Scene& s, const Converged& reference, const trade::
 }
 
 double error_bound(const Setting& s, const Converged& reference) noexcept {
-  return kBetween * (s.joint_error + reference.uncertainty);
+  return kBetween * (s.joint_error + reference.uncertainty) + kRounding;
 }
 
 bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& reference) noexcept {

@@ -17,7 +17,7 @@ constexpr double kParallel = 1e-12;     // gravity that is off an axis by less i
 constexpr double kLeastStreamHz = 30;   // a stream is resampled at least so often
 constexpr double kSetsInStaleness = 3;  // so many sets come while one of them would still be fresh
 
-std::string count(std::size_t k, const std::string& of) { return std::to_string(k).append(" ").append(of); }
+std::string count(std::size_t k, const std::string& of) { return of + ": " + std::to_string(k); }
 
 Reduction& note(Scene& s, const std::string& name, bool in_force, const std::string& what,
                 const std::string& why) {
@@ -117,7 +117,7 @@ void note_terms(Scene& s) {
   }
   const bool none = s.dynamics.stop_stiffness == 0;
   note(s, "terms", none, none ? "no stop torques evaluated" : "stop torques evaluated",
-       count(still, "zero dampings and rotor inertias stay: a product and a sum each, no branch"));
+       count(still, "zero dampings and rotor inertias stay, a product and a sum each, no branch"));
 }
 
 /// The scene's obstacles that stand still, as perception will publish them.
@@ -139,7 +139,7 @@ void note_obstacles(Scene& s) {
   const bool cull = wanted(s.reduce, s.reduce.obstacles, true);
   const std::string rest = moving ? "; moving ones are looked at in each set" : "";
   if (!cull) kept = all;
-  sizes(note(s, "obstacles", cull, count(all.size() - kept.size(), "of the standing obstacles culled") + rest,
+  sizes(note(s, "obstacles", cull, count(all.size() - kept.size(), "standing obstacles culled") + rest,
              cull ? "out of reach of every force, and never the nearest to a link; each set is sifted once"
                   : "forbidden"),
         static_cast<double>(all.size()), static_cast<double>(kept.size()), "obstacles");

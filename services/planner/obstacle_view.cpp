@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::size_t kMaxWaiting = 64;  ///< sets ahead of time kept for one source
 constexpr std::size_t kMaxSources = 16;
-constexpr double kHorizon_s = 5;  ///< a moving obstacle is culled when it is out of reach for so long
+constexpr std::size_t kWorthwhile = 2;  ///< a lone obstacle is the nearest anyway
+constexpr double kHorizon_s = 5;        ///< a moving obstacle is culled when it is out of reach for so long
 
 }  // namespace
 
@@ -74,7 +75,9 @@ double ObstacleView::at(double t_s, const Eigen::VectorXd& q, wire::Causes& caus
   if (changed_) put_together();
   const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q);
   shown_ = all_;
-  if (sound && cull_) {
+  if (sound && cull_ && kept_.size() < kWorthwhile) {
+    shown_ = kept_;
+  } else if (sound && cull_) {
     if (near_is_old_ || !reach_->stays_near(q)) reach_->sift_near(q, kept_, near_);
     near_is_old_ = false;
     shown_ = near_;
