@@ -171,6 +171,8 @@ void print_text(const Explained& e) {
 
 int explain(const ExplainArgs& args) {
   runtime::start_log("hamel", false);
+  if (!std::isfinite(args.seconds))
+    return runtime::complain("hamel explain", {{"--seconds", "must be finite"}});
   std::vector<scene::Scene> scenes;
   for (const std::string& path : args.scene_paths) {
     auto s = files::read_scene(path, args.overrides);

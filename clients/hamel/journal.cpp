@@ -19,6 +19,7 @@ std::string all_of(const std::string& path) {
 
 Result<std::unique_ptr<Journal>, Problem> Journal::open(const std::string& path, const std::string& job,
                                                         const std::string& header) {
+  if (std::filesystem::is_directory(path)) return Problem{path, "is a folder"};
   std::unique_ptr<Journal> j(new Journal);
   j->path_ = path;
   j->head_ = "# " + job + "\n";

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -27,6 +28,21 @@ std::uint64_t mixed(std::uint64_t seed) {
 double uniform(std::uint64_t seed, std::size_t variation, std::size_t field) {
   const std::uint64_t drawn = mixed(mixed(mixed(seed) ^ variation) ^ (field << 32));
   return static_cast<double>(drawn >> 11) * 0x1p-53;
+}
+
+/// What is wrong with the names of the fields that vary, or nothing.
+std::string fault(const std::vector<std::string>& fields) {
+  const auto printable = [](char c) { return c > ' ' && c <= '~'; };
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const std::string& name = fields[k];
+    const std::string column = "column " + std::to_string(k + 1);
+    if (name.empty() || !std::all_of(name.begin(), name.end(), printable))
+      return column + " must name a field, such as planner.kp or q0[1]";
+    if (std::find(fields.begin(), fields.begin() + static_cast<std::ptrdiff_t>(k), name) !=
+        fields.begin() + static_cast<std::ptrdiff_t>(k))
+      return column + ": " + name + " varies already";
+  }
+  return "";
 }
 
 /// Cells of one line: commas part them, except within brackets and quotes.
@@ -69,19 +85,23 @@ Checked<Variations> Variations::from_csv(const std::string& path) {
   if (!text) return text.error();
   Variations out;
   Problems found;
-  std::istringstream in(text.value());
+  const bool marked = text.value().starts_with("\xef\xbb\xbf");  // as some spreadsheets begin
+  std::istringstream in(text.value().substr(marked ? 3 : 0));
   std::string line;
   for (std::size_t k = 1; std::getline(in, line); ++k) {
     if (line.empty() || line == "\r" || line.front() == '#') continue;
     std::vector<std::string> row = cells(line);
-    if (out.fields_.empty())
+    if (out.fields_.empty()) {
       out.fields_ = std::move(row);
-    else if (row.size() == out.fields_.size())
+      if (const std::string why = fault(out.fields_); !why.empty())
+        return Problems{{path + ":" + std::to_string(k), why}};
+    } else if (row.size() == out.fields_.size()) {
       out.rows_.push_back(std::move(row));
-    else
+    } else {
       found.push_back(
           {path + ":" + std::to_string(k),
            "has " + std::to_string(row.size()) + " cells, must have " + std::to_string(out.fields_.size())});
+    }
     if (found.size() >= 20) break;
   }
   if (found.empty() && out.rows_.empty()) found.push_back({path, "has no variations"});

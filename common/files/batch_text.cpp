@@ -57,6 +57,9 @@ Checked<BatchText> load_batch(const std::string& path) {
     const std::string where = path + ":" + std::to_string(at.line) + ":" + std::to_string(at.column);
     if (const std::string why = fault(v, out.random > 0); !why.empty())
       found.push_back({where, "vary: " + why});
+    for (int k = 0; k < i; ++k)
+      if (out.vary[static_cast<std::size_t>(k)].field == v.field)
+        found.push_back({where, "vary: " + v.field + " varies already"});
     product *= v.values.empty() ? v.count : static_cast<double>(v.values.size());
   }
   if (out.vary.empty()) found.push_back({path, "varies nothing"});
