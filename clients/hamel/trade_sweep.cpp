@@ -171,7 +171,7 @@ std::vector<Options> candidates(const Motion& m, bool quick) {
   list.add(with(Tier::semi_implicit_euler, Root::feedback, 0), -2, 2);
   list.add(with(Tier::hamel, Root::feedback, 1e-8), -2, 2);
   if (!quick) list.add(with(Tier::hamel, Root::newton, 1e-8), -2, 2);
-  for (const Root root : {Root::automatic, Root::feedback, Root::newton}) {
+  for (const Root root : {Root::adaptive, Root::feedback, Root::newton}) {
     list.add(with(Tier::midpoint, root, 0), -2, 4);
     if (!quick) list.add(with(Tier::midpoint, root, 1e-6), -2, 4);
   }

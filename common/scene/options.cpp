@@ -94,8 +94,8 @@ const char* to_string(Root v) {
       return "feedback";
     case Root::newton:
       return "newton";
-    case Root::automatic:
-      return "automatic";
+    case Root::adaptive:
+      return "adaptive";
   }
   return "?";
 }

@@ -14,7 +14,7 @@ namespace hamel::scene {
 inline constexpr double kInf = std::numeric_limits<double>::infinity();
 
 enum class Tier : std::uint8_t { hamel, midpoint, gauss, semi_implicit_euler, rk4, dopri8 };
-enum class Root : std::uint8_t { feedback, newton, automatic };
+enum class Root : std::uint8_t { feedback, newton, adaptive };
 enum class Start : std::uint8_t { extrapolated, previous };
 enum class Space : std::uint8_t { automatic, se3 };
 enum class Safe : std::uint8_t { hold, brake };  ///< keep the place, or only come to rest; gravity is held
@@ -22,10 +22,10 @@ enum class Safe : std::uint8_t { hold, brake };  ///< keep the place, or only co
 /// How the arm is integrated.
 struct DynamicsOptions {
   Tier tier = Tier::midpoint;
-  double dt_s = 1e-3;           ///< time step, > 0
-  double alpha = 0.5;           ///< tier hamel: where in the step (9) takes the velocity, in [0, 1]
-  int stages = 4;               ///< tier gauss: 1..8, order 2 * stages
-  Root root = Root::automatic;  ///< Eq. (16); Newton with the exact recursive Jacobian; what costs less
+  double dt_s = 1e-3;          ///< time step, > 0
+  double alpha = 0.5;          ///< tier hamel: where in the step (9) takes the velocity, in [0, 1]
+  int stages = 4;              ///< tier gauss: 1..8, order 2 * stages
+  Root root = Root::adaptive;  ///< Eq. (16); Newton with the exact recursive Jacobian; what costs less
   Start start =
       Start::extrapolated;       ///< first guess of the increment; `previous` is the paper's q^{k+1} = q^k
   double tolerance_Nm = 0;       ///< stop when |residual|_inf is below; 0: scaled with momentum, to rounding

@@ -72,6 +72,11 @@ double distance_m(const Vector3d& p_W, const geometry::Obstacle& o) {
   return geometry::closest({p_W, p_W, 0, 0}, o.shape, o.X_WO).distance_m;
 }
 
+/// No more than distance_m(); nor is that more than the distance of the obstacle's origin, which lies in it.
+double distance_bound_m(const Vector3d& p_W, const geometry::Obstacle& o) {
+  return geometry::distance_bound({p_W, p_W, 0, 0}, o.shape, o.X_WO);
+}
+
 }  // namespace
 
 Reach::Reach(const Robot& robot, const PlannerOptions& options)
@@ -86,7 +91,7 @@ Reach::Reach(const Robot& robot, const PlannerOptions& options)
     if (s.link < 0) continue;
     bodies_.push_back({s.link, s.X_LS * geometry::enclosing_capsule(s.shape)});
     const geometry::Capsule& c = bodies_.back().capsule_B;
-    balls_.push_back(ball_of(chain_, s.link, c));
+    add_ball(ball_of(chain_, s.link, c));
     double beyond = std::max(c.p0.norm(), c.p1.norm());  // from joint j's origin to the capsule's axis
     for (int j = s.link; j >= 0; --j) {
       const model::Joint& joint = chain_.joint(j);
@@ -95,6 +100,16 @@ Reach::Reach(const Robot& robot, const PlannerOptions& options)
       beyond += joint.X_PJ.p.norm() + travel_m(joint);
     }
   }
+}
+
+void Reach::add_ball(const ReachBall& ball) {
+  std::size_t k = 0;
+  while (k < centres_.size() && centres_[k].p_W != ball.centre_W) ++k;
+  if (k == centres_.size()) centres_.push_back({ball.centre_W});
+  centres_[k].axis_m = std::max(centres_[k].axis_m, ball.axis_m);
+  centres_[k].out_m = std::max(centres_[k].out_m, ball.axis_m + ball.radius_m);
+  centre_of_.push_back(k);
+  balls_.push_back(ball);
 }
 
 bool Reach::holds(const Eigen::VectorXd& q) const noexcept {
@@ -118,8 +133,9 @@ double Reach::grows_m(const geometry::Obstacle& o, double horizon_s) const noexc
   return 2 * std::max(o.sigma_m, 0.0) + aged;
 }
 
-bool Reach::may_cover_target(const geometry::Obstacle& o, double way_m, double grown_m) const noexcept {
-  const double least = distance_m(target_.centre_W, o) - target_.axis_m - target_.radius_m - way_m;
+/// `distance_m`: of the obstacle to the target's centre, at least.
+bool Reach::may_cover_target(double distance_m, double way_m, double grown_m) const noexcept {
+  const double least = distance_m - target_.axis_m - target_.radius_m - way_m;
   return !(least - grown_m > margin_m_);
 }
 
@@ -153,7 +169,7 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
   kept.clear();
   for (std::size_t k = 0; k < set.size(); ++k) {
     const double grown = grows_m(set[k], 0);
-    bool matters = !stands(set[k]) || may_cover_target(set[k], kSlack_m, grown);
+    bool matters = !stands(set[k]) || may_cover_target(distance_m(target_.centre_W, set[k]), kSlack_m, grown);
     for (std::size_t b = 0; b < m && !matters; ++b) {
       const double most = std::max(rho0_m_ + grown, nearest_m_[static_cast<std::size_t>(bodies_[b].link)]);
       matters = !(near_m_[k * m + b] > most + 2 * kNear_m + kSlack_m);
@@ -162,40 +178,72 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
   }
 }
 
-void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
-                 std::vector<geometry::Obstacle>& kept, std::vector<double>& floor_m) const {
-  constexpr double inf = std::numeric_limits<double>::infinity();
-  const auto n = static_cast<std::size_t>(chain_.n());
-  kept.clear();
-  floor_m.assign(n, inf);
-  std::vector<double> nearest_at_most(n, inf);  // of the obstacle that is nearest to each link
-  std::vector<double> centre(set.size() * balls_.size());
+/// By bounding spheres: puts into left_ what may matter for all they tell, and the others' floors into
+/// floor_m.
+void Reach::sift_roughly(std::span<const geometry::Obstacle> set, double horizon_s,
+                         std::vector<double>& floor_m) {
+  const std::size_t m = centres_.size();
+  left_.clear();
+  near_m_.resize(set.size() * m);
+  nearest_m_.assign(m, std::numeric_limits<double>::infinity());
   for (std::size_t k = 0; k < set.size(); ++k) {
-    const geometry::Obstacle& o = set[k];
-    const bool plain = is_plain(o);
-    for (std::size_t b = 0; b < balls_.size(); ++b) {
-      const ReachBall& ball = balls_[b];
-      const auto link = static_cast<std::size_t>(ball.link);
-      if (!plain) {
-        floor_m[link] = -inf;
-        continue;
-      }
-      const double s = distance_m(ball.centre_W, o) - ball.radius_m, way = spread_m(o, horizon_s) + kSlack_m;
-      centre[k * balls_.size() + b] = s;
-      nearest_at_most[link] = std::min(nearest_at_most[link], s + ball.axis_m + way);
-      floor_m[link] = std::min(floor_m[link], s - ball.axis_m - way - grows_m(o, horizon_s));
+    if (!is_plain(set[k])) continue;
+    const double way = spread_m(set[k], horizon_s) + kSlack_m;
+    for (std::size_t c = 0; c < m; ++c) {
+      near_m_[k * m + c] = distance_bound_m(centres_[c].p_W, set[k]) - way;
+      nearest_m_[c] = std::min(nearest_m_[c], (centres_[c].p_W - set[k].X_WO.p).norm() + way);
     }
   }
   for (std::size_t k = 0; k < set.size(); ++k) {
     const geometry::Obstacle& o = set[k];
-    bool matters = !is_plain(o);
     const double way = spread_m(o, horizon_s) + kSlack_m, grown = grows_m(o, horizon_s);
-    for (std::size_t b = 0; b < balls_.size() && !matters; ++b) {
-      const double least = centre[k * balls_.size() + b] - balls_[b].axis_m - way;
-      const double nearest = nearest_at_most[static_cast<std::size_t>(balls_[b].link)];
-      matters = !(least - grown > rho0_m_ && least > nearest);
+    bool far = is_plain(o) && !may_cover_target(distance_bound_m(target_.centre_W, o), way, grown);
+    for (std::size_t c = 0; c < m && far; ++c) {
+      const double least = near_m_[k * m + c];
+      far = least - grown > rho0_m_ + centres_[c].out_m && least > nearest_m_[c] + 2 * centres_[c].axis_m;
     }
-    if (matters || may_cover_target(o, way, grown)) kept.push_back(o);
+    if (!far) left_.push_back(k);
+    for (std::size_t b = 0; b < balls_.size() && far; ++b) {
+      double& floor = floor_m[static_cast<std::size_t>(balls_[b].link)];
+      const double least = near_m_[k * m + centre_of_[b]] - balls_[b].axis_m - balls_[b].radius_m;
+      floor = std::min(floor, least - grown);
+    }
+  }
+}
+
+void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
+                 std::vector<geometry::Obstacle>& kept, std::vector<double>& floor_m) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const auto n = static_cast<std::size_t>(chain_.n());
+  const std::size_t m = centres_.size();
+  kept.clear();
+  floor_m.assign(n, inf);
+  sift_roughly(set, horizon_s, floor_m);
+  near_m_.resize(left_.size() * m);
+  nearest_m_.assign(n, inf);  // an upper bound of how far the obstacle nearest to each link is
+  for (std::size_t k = 0; k < left_.size(); ++k) {
+    const geometry::Obstacle& o = set[left_[k]];
+    const bool plain = is_plain(o);
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = grows_m(o, horizon_s);
+    for (std::size_t c = 0; c < m && plain; ++c) near_m_[k * m + c] = distance_m(centres_[c].p_W, o);
+    for (std::size_t b = 0; b < balls_.size(); ++b) {
+      const ReachBall& ball = balls_[b];
+      const auto link = static_cast<std::size_t>(ball.link);
+      const double s = plain ? near_m_[k * m + centre_of_[b]] - ball.radius_m : -inf;
+      if (plain) nearest_m_[link] = std::min(nearest_m_[link], s + ball.axis_m + way);
+      floor_m[link] = std::min(floor_m[link], s - ball.axis_m - way - grown);
+    }
+  }
+  for (std::size_t k = 0; k < left_.size(); ++k) {
+    const geometry::Obstacle& o = set[left_[k]];
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = grows_m(o, horizon_s);
+    bool matters = !is_plain(o) || may_cover_target(distance_m(target_.centre_W, o), way, grown);
+    for (std::size_t b = 0; b < balls_.size() && !matters; ++b) {
+      const ReachBall& ball = balls_[b];
+      const double least = near_m_[k * m + centre_of_[b]] - ball.radius_m - ball.axis_m - way;
+      matters = !(least - grown > rho0_m_ && least > nearest_m_[static_cast<std::size_t>(ball.link)]);
+    }
+    if (matters) kept.push_back(o);
   }
 }
 

@@ -39,7 +39,7 @@ class Reach {
   /// some link, or may lie over a target that the arm reaches.  What is left out changes no output of the
   /// planner.  Obstacles that turn, or are not finite, are kept.  O(links x obstacles).
   void sift(std::span<const geometry::Obstacle> set, double horizon_s, std::vector<geometry::Obstacle>& kept,
-            std::vector<double>& floor_m) const;
+            std::vector<double>& floor_m);
 
   /// Of a sifted set, puts into `kept` what matters while the arm stays about q: drops standing obstacles out
   /// of reach that others are surely nearer than.  Good while stays_near() says so.  O(links x obstacles).
@@ -52,22 +52,31 @@ class Reach {
   std::span<const ReachBall> balls() const noexcept { return balls_; }
 
  private:
-  double spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
-
   struct Body {
     int link = 0;
     geometry::Capsule capsule_B;
   };
+  /// A point that several balls are about, and the largest of them.
+  struct Centre {
+    Eigen::Vector3d p_W;
+    double axis_m = 0, out_m = 0;  ///< of a capsule's axis; of its surface
+  };
+  void add_ball(const ReachBall& ball);
+  void sift_roughly(std::span<const geometry::Obstacle> set, double horizon_s, std::vector<double>& floor_m);
+  double spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
   double grows_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
-  bool may_cover_target(const geometry::Obstacle& o, double way_m, double grown_m) const noexcept;
+  bool may_cover_target(double distance_m, double way_m, double grown_m) const noexcept;
 
   std::vector<ReachBall> balls_;
-  std::vector<Body> bodies_;  ///< one a ball
-  ReachBall target_;          ///< where the end effector's body is when it is at a target that can be reached
+  std::vector<Centre> centres_;
+  std::vector<std::size_t> centre_of_;  ///< each ball
+  std::vector<Body> bodies_;            ///< one a ball
+  ReachBall target_;  ///< where the end effector's body is when it is at a target that can be reached
   model::Chain chain_;
   rbd::Workspace ws_;
   Eigen::VectorXd q_near_, lever_m_;  ///< where the last sift_near() was; how far each joint moves the arm
-  std::vector<double> near_m_, nearest_m_;  ///< scratch: distances of bodies and obstacles, least of links
+  std::vector<double> near_m_, nearest_m_;  ///< scratch: distances of obstacles, and the least
+  std::vector<std::size_t> left_;           ///< scratch: what sift_roughly() leaves
   double rho0_m_ = 0, margin_m_ = 0, assumed_speed_mps_ = 0;
 };
 

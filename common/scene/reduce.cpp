@@ -130,7 +130,7 @@ std::vector<geometry::Obstacle> standing(const Scene& s) {
 
 void note_obstacles(Scene& s) {
   if (!s.steered) return;
-  const Reach reach(s.robot, s.planner);
+  Reach reach(s.robot, s.planner);
   const std::vector<geometry::Obstacle> all = standing(s);
   std::vector<geometry::Obstacle> kept;
   std::vector<double> floor_m;

@@ -25,7 +25,7 @@ struct StreamSample {
 /// The header a stream's text must begin with.
 inline constexpr std::string_view kStreamHeader = "t_s,id,x_m,y_m,z_m,radius_m";
 
-/// The samples of a stream's text, spheres,, or every bad line as "name:line".  Rules: the header is
+/// The samples of a stream's text, spheres, or every bad line as "name:line".  Rules: the header is
 /// kStreamHeader; each row has six numbers, all finite; t_s never decreases; radius_m >= 0; an id occurs once
 /// per time; at least one row.  Lines may end in CR LF; empty lines and lines that begin with # are passed
 /// over.  Stops listing after 20 problems.

@@ -199,7 +199,10 @@ void PlannerService::plan(Time now) {
                  .qd = qd_,
                  .obstacles = view_.obstacles(),
                  .obstacle_age_s = obstacle_age_s_,
-                 .state_age_s = std::chrono::duration<double>(now - last_state_).count(),
+                 // lockstep waits as long as it takes: nothing ages there
+                 .state_age_s = config_.pace == scene::Pace::lockstep
+                                    ? 0
+                                    : std::chrono::duration<double>(now - last_state_).count(),
                  .obstacles_expected = true,
                  .link_floor_m = view_.link_floor_m()};
   planner_.plan(in, output_);

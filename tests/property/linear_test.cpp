@@ -96,7 +96,7 @@ void expect_few_evaluations(int n, double bend, unsigned seed, Options options) 
 }
 
 TEST(Evaluations, OfABentChainAreAtMostFive) {
-  for (const Root root : {Root::automatic, Root::newton})
+  for (const Root root : {Root::adaptive, Root::newton})
     for (const int n : {3, 7, 30, 100, 300, 1000})
       for (const unsigned seed : {1u, 2u}) {
         expect_few_evaluations(n, std::min(0.1, 0.7 / n), seed, {.dt_s = 1e-3, .root = root});

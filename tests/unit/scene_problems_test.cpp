@@ -38,7 +38,7 @@ Scene valid() {
           {},     {}, {}, 10,    StopRule::when_reached};
   s.goal->id = 1;
   s.perception.obstacles = {sphere(1), sphere(2)};
-  s.perception.stream.emplace().samples = {{0, 7, {0, 0, 0}, 0.1}};
+  s.perception.stream.emplace().samples = {{0, 7, {0, 0, 0}, {geometry::ShapeKind::sphere, {0.1, 0, 0}}}};
   return s;
 }
 

@@ -160,7 +160,7 @@ TEST_P(Reduced, WhatIsCulledNeverMatters) {
   }
   std::vector<double> floor_m;
   const double horizon_s = 0.5;
-  const Reach reach(s.robot, s.planner);
+  Reach reach(s.robot, s.planner);
   reach.sift(set, horizon_s, kept, floor_m);
   rbd::Workspace ws(s.robot.chain);
   for (int k = 0; k < 100; ++k) {

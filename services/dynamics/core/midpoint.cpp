@@ -181,7 +181,7 @@ Residual MidpointStep<G>::evaluate(const VectorXd& d) noexcept {
 template <class G>
 bool MidpointStep<G>::newton_pays() const noexcept {
   return options_.root == Root::newton ||
-         (options_.root == Root::automatic &&
+         (options_.root == Root::adaptive &&
           (linearised_ ||
            (contraction_.rate() < kResolved && contraction_.updates_left(kWorthNewton) == kWorthNewton)));
 }
@@ -210,7 +210,7 @@ void MidpointStep<G>::correct(VectorXd& d) noexcept {
 template <class G>
 double MidpointStep<G>::remembered_rate() const noexcept {
   const double before = IncrementHistory::rate(*from_, h_);
-  if (linearised_ && options_.root == Root::automatic)
+  if (linearised_ && options_.root == Root::adaptive)
     return feedback_rate_ > 0 ? feedback_rate_ : kForget * before;
   const double seen = contraction_.seen();
   return std::min(1.0, seen > 0 ? std::max(seen, kForget * before) : kAge * before);
