@@ -4,8 +4,10 @@
 #include <cmath>
 #include <system_error>
 
+#include "clients/hamel/batch_verb.h"
 #include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
+#include "clients/hamel/explain.h"
 #include "clients/hamel/figures.h"
 #include "clients/hamel/network_verbs.h"
 #include "clients/hamel/plot.h"
@@ -210,6 +212,44 @@ CLI::App* add_figures(CLI::App& app, client::FiguresArgs& a) {
   return figures;
 }
 
+CLI::App* add_explain(CLI::App& app, client::ExplainArgs& a) {
+  auto* explain =
+      app.add_subcommand("explain", "what a scene requires, what was left out and why, and what that bought");
+  explain->add_option("scene", a.scene_paths, "scene file (.textproto); several with --table")
+      ->required()
+      ->type_name("SCENE");
+  explain->add_option("--set", a.overrides, "override a field of the scene; repeat")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  auto* json = explain->add_flag("--json", a.json, "one JSON object");
+  explain
+      ->add_flag("--table", a.table,
+                 "speed against accuracy instead: full, exact and fastest fidelity of each scene, Markdown")
+      ->excludes(json);
+  explain->add_option("--seconds", a.seconds, "wall time for each measurement of cost")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  return explain;
+}
+
+CLI::App* add_batch(CLI::App& app, client::BatchArgs& a) {
+  auto* batch = app.add_subcommand("batch", "run many variations of a scene on all cores");
+  batch->add_option("file", a.path, "what to vary: .textproto (deploy/README.md), or .csv beside --scene")
+      ->required()
+      ->type_name("FILE");
+  batch->add_option("--scene", a.scene_path, "scene file, instead of the one that the file names")
+      ->type_name("SCENE");
+  batch->add_option("--set", a.overrides, "override a field of every variation; repeat")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  batch->add_option("-o,--output", a.out_path, "CSV, a row a variation; a killed batch goes on from there")
+      ->type_name("FILE");
+  batch->add_option("-j,--workers", a.workers, "threads; 0: one a core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  return batch;
+}
+
 int verbs(int argc, char** argv) {
   CLI::App app{"hamel: robot-arm dynamics and reactive planning as services on a DDS network"};
   app.require_subcommand(1);
@@ -261,6 +301,11 @@ int verbs(int argc, char** argv) {
   client::FiguresArgs figures_args;
   const auto* figures = add_figures(app, figures_args);
 
+  client::ExplainArgs explain_args;
+  const auto* explain = add_explain(app, explain_args);
+  client::BatchArgs batch_args;
+  const auto* batch = add_batch(app, batch_args);
+
   RecordVerbs recordings(app);
   client::BenchVerb bench(app);
   const client::NetworkVerbs network(app);  // adds to bench
@@ -271,6 +316,8 @@ int verbs(int argc, char** argv) {
   if (const auto code = network.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (figures->parsed()) return client::figures(figures_args);
+  if (explain->parsed()) return client::explain(explain_args);
+  if (batch->parsed()) return client::batch(batch_args);
   if (trade->parsed()) return client::trade(trade_args);
   if (run->parsed()) return client::run(run_args);
   if (up->parsed()) return client::up(up_args);

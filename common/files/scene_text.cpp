@@ -9,6 +9,7 @@
 #include "common/files/stream.h"
 #include "common/files/text_fields.h"
 #include "common/files/urdf.h"
+#include "common/scene/reduce.h"
 
 namespace hamel::files {
 namespace {
@@ -109,7 +110,10 @@ class Loader {
                    std::move(parts.perception),
                    parts.bus,
                    parts.duration_s,
-                   parts.stop};
+                   parts.stop,
+                   parts.reduce,
+                   parts.accuracy,
+                   std::move(parts.locked)};
     if (s.name.empty()) s.name = std::filesystem::path(path_).stem().string();
     Problems broken = scene::problems(s);
     std::erase_if(broken, [&](const Problem& p) { return is_said(p.where, s, real); });
@@ -123,7 +127,8 @@ class Loader {
     if (path == "perception.stream.path")
       return s.perception.stream->samples.empty() && s.perception.stream->empty_s.empty();
     const bool of_joints = path.starts_with("q0") || path.starts_with("qd0") ||
-                           path.starts_with("goal.joints") || path == "planner.kc";
+                           path.starts_with("goal.joints") || path.starts_with("locked") ||
+                           path == "planner.kc";
     return of_joints && !real_robot;
   }
 
@@ -159,8 +164,14 @@ class Loader {
 
 }  // namespace
 
-Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+Checked<scene::Scene> read_scene(const std::string& path, const std::vector<std::string>& overrides) {
   return Loader(path, overrides).load();
+}
+
+Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  auto scene = read_scene(path, overrides);
+  if (scene) scene::reduce(scene.value());
+  return scene;
 }
 
 Problems set_planner(const std::vector<std::string>& assignments, scene::PlannerOptions& options) {

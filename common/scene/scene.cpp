@@ -3,6 +3,7 @@
 #include <numbers>
 #include <set>
 
+#include "common/scene/locked.h"
 #include "common/scene/rules.h"
 
 namespace hamel::scene {
@@ -212,6 +213,8 @@ Problems problems(const Scene& s) {
   append(all, problems(s.dynamics));
   append(all, problems(s.planner));
   append(all, problems(s.perception));
+  append(all, problems(s.accuracy));
+  append(all, lock_problems(s));
   return all;
 }
 

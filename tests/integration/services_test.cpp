@@ -190,38 +190,35 @@ TEST(ObstacleView, WaitsForTheSetThatCoversATime) {
 
 TEST(ObstacleView, UsesTheNewestSetThatIsNotFromTheFuture) {
   planner::ObstacleView v;
-  std::vector<geometry::Obstacle> out;
   wire::Causes causes;
-  EXPECT_TRUE(std::isinf(v.at(0, out, causes))) << "nothing ever arrived";
+  EXPECT_TRUE(std::isinf(v.at(0, {}, causes))) << "nothing ever arrived";
   v.add(set(0, 0.1, 1, 1));
   v.add(set(0.1, 0.2, 1, 2));
-  EXPECT_DOUBLE_EQ(v.at(0.05, out, causes), 0.05);
-  EXPECT_EQ(out.size(), 1u);
-  EXPECT_DOUBLE_EQ(v.at(0.15, out, causes), 0.15 - 0.1);
-  EXPECT_EQ(out.size(), 2u);
+  EXPECT_DOUBLE_EQ(v.at(0.05, {}, causes), 0.05);
+  EXPECT_EQ(v.obstacles().size(), 1u);
+  EXPECT_DOUBLE_EQ(v.at(0.15, {}, causes), 0.15 - 0.1);
+  EXPECT_EQ(v.obstacles().size(), 2u);
   v.add(set(0, 0.1, 1, 1));  // late: its successor is in use
-  EXPECT_DOUBLE_EQ(v.at(0.15, out, causes), 0.15 - 0.1);
-  EXPECT_EQ(out.size(), 2u);
+  EXPECT_DOUBLE_EQ(v.at(0.15, {}, causes), 0.15 - 0.1);
+  EXPECT_EQ(v.obstacles().size(), 2u);
 }
 
 TEST(ObstacleView, AnEmptySetIsSomethingElseThanNone) {
   planner::ObstacleView v;
-  std::vector<geometry::Obstacle> out;
   wire::Causes causes;
   v.add(set(0, wire::kInf, 1, 0));
-  EXPECT_EQ(v.at(7, out, causes), 0) << "it promised no successor: it does not age";
+  EXPECT_EQ(v.at(7, {}, causes), 0) << "it promised no successor: it does not age";
   EXPECT_TRUE(v.covers(7));
-  EXPECT_TRUE(out.empty());
+  EXPECT_TRUE(v.obstacles().empty());
 }
 
 TEST(ObstacleView, PutsSourcesTogetherAndIsAsOldAsTheOldest) {
   planner::ObstacleView v;
-  std::vector<geometry::Obstacle> out;
   wire::Causes causes;
   v.add(set(0.5, 1, 2, 3));
   v.add(set(0, 1, 1, 2));
-  EXPECT_DOUBLE_EQ(v.at(0.6, out, causes), 0.6);
-  EXPECT_EQ(out.size(), 5u);
+  EXPECT_DOUBLE_EQ(v.at(0.6, {}, causes), 0.6);
+  EXPECT_EQ(v.obstacles().size(), 5u);
   EXPECT_EQ(causes.size, 2u);
 }
 

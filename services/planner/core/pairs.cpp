@@ -84,28 +84,16 @@ geometry::Capsule Pairs::link_W(const Arm& arm, int shape) const noexcept {
   return arm.ws.X_WB[static_cast<std::size_t>(body.link)] * body.capsule_B;
 }
 
-void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
+void Pairs::find(const Arm& arm, const Obstacles& obstacles, std::span<const double> link_floor_m) noexcept {
   clear();
-  for (const Body& body : bodies_) {
-    const geometry::Capsule capsule = link_W(arm, body.index);
-    Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
-    for (const Obstacles::Item& item : obstacles.items()) {
-      const double bound = geometry::distance_bound(capsule, item.now.shape, item.now.X_WO);
-      if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
-      Pair pair;
-      pair.at = geometry::closest(capsule, item.now.shape, item.now.X_WO);
-      if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
-      pair.d = pair.at.distance_m - item.inflation_m;
-      if (!(pair.d <= options_.rho0_m)) continue;
-      pair.shape = body.index;
-      pair.link = body.link;
-      pair.obstacle = item.now.id;
-      pair.item = &item;
-      pair.n = pair.at.normal;
-      offer(pair);
-    }
-    clearance_m_ = std::min(clearance_m_, nearest.at.distance_m);
-  }
+  const auto floor_of = [&](const Body& body) {
+    const auto link = static_cast<std::size_t>(body.link);
+    return link < link_floor_m.size() ? link_floor_m[link] : -std::numeric_limits<double>::infinity();
+  };
+  for (const Body& body : bodies_)
+    if (!(floor_of(body) > options_.rho0_m)) measure(body, arm, obstacles);
+  for (const Body& body : bodies_)
+    if (floor_of(body) > options_.rho0_m && floor_of(body) < clearance_m_) measure(body, arm, obstacles);
   if (dropped_ > 0)
     std::sort(
         pairs_.begin(), pairs_.begin() + static_cast<std::ptrdiff_t>(count_),
@@ -113,6 +101,27 @@ void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
   const bool only_nearest =
       options_.method != scene::Method::gyro && options_.pairs == scene::PairPolicy::nearest;
   if (only_nearest) keep_nearest_of_each_link();
+}
+
+void Pairs::measure(const Body& body, const Arm& arm, const Obstacles& obstacles) noexcept {
+  const geometry::Capsule capsule = link_W(arm, body.index);
+  Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
+  for (const Obstacles::Item& item : obstacles.items()) {
+    const double bound = geometry::distance_bound(capsule, item.now.shape, item.now.X_WO);
+    if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
+    Pair pair;
+    pair.at = geometry::closest(capsule, item.now.shape, item.now.X_WO);
+    if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
+    pair.d = pair.at.distance_m - item.inflation_m;
+    if (!(pair.d <= options_.rho0_m)) continue;
+    pair.shape = body.index;
+    pair.link = body.link;
+    pair.obstacle = item.now.id;
+    pair.item = &item;
+    pair.n = pair.at.normal;
+    offer(pair);
+  }
+  clearance_m_ = std::min(clearance_m_, nearest.at.distance_m);
 }
 
 // When the table is full the farthest pair makes room.

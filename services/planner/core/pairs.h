@@ -64,8 +64,9 @@ class Pairs {
   Pairs(const scene::Robot& robot, const scene::PlannerOptions& options);
 
   void clear() noexcept;
-  /// Distances of every link shape to every obstacle; those within rho0 become pairs.
-  void find(const Arm& arm, const Obstacles& obstacles) noexcept;
+  /// Distances of every link shape to every obstacle; those within rho0 become pairs.  Links whose floor is
+  /// above rho0 and above the clearance of the others are passed over (Input::link_floor_m).
+  void find(const Arm& arm, const Obstacles& obstacles, std::span<const double> link_floor_m = {}) noexcept;
   /// The same pairs `ahead_s` later, the arm having gone there too.
   void advance(const Arm& arm, double ahead_s) noexcept;
   /// Velocities, Jacobians and operational inertias of the pairs.
@@ -90,14 +91,15 @@ class Pairs {
   double tip_radius_m() const noexcept { return tip_radius_m_; }
 
  private:
-  geometry::Capsule link_W(const Arm& arm, int shape) const noexcept;
-  void offer(const Pair& pair) noexcept;
-  void keep_nearest_of_each_link() noexcept;
-
   struct Body {
     int index = 0, link = 0;
     geometry::Capsule capsule_B;
   };
+  geometry::Capsule link_W(const Arm& arm, int shape) const noexcept;
+  void measure(const Body& body, const Arm& arm, const Obstacles& obstacles) noexcept;
+  void offer(const Pair& pair) noexcept;
+  void keep_nearest_of_each_link() noexcept;
+
   const scene::PlannerOptions& options_;
   std::vector<Body> bodies_;
   std::vector<Pair> pairs_;

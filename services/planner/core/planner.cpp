@@ -142,7 +142,7 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
   arm.look(in.q, in.qd);
   remember_tip();
   obstacles.take(in.obstacles, in.obstacle_age_s, options);
-  pairs.find(arm, obstacles);
+  pairs.find(arm, obstacles, in.link_floor_m);
   memory.clearance_min_m = std::min(memory.clearance_min_m, pairs.clearance_m());
   const bool contact = pairs.clearance_m() < 0;
   memory.contacts += contact;
