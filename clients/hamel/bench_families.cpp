@@ -303,7 +303,7 @@ Checked<BenchRobots> bench_robots(ArmModel model) {
     lift_torque_limits(robots.panda);
     return robots;
   }
-  robots.panda.self_links = scene::self_links(robots.panda).watched;
+  scene::watch(robots.panda, scene::self_links(robots.panda).watched);
   return robots;
 }
 

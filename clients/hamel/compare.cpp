@@ -35,9 +35,9 @@ std::string show(const wire::Field& f) {
 std::optional<Problem> Comparison::tolerate(const std::string& text) {
   const auto equals = text.find('=');
   double value = -1;
-  if (equals != std::string::npos)
-    std::from_chars(text.data() + equals + 1, text.data() + text.size(), value);
-  if (!(value >= 0))
+  const char *number = text.data() + equals + 1, *end = text.data() + text.size();
+  if (equals == std::string::npos || std::from_chars(number, end, value).ptr != end ||
+      !std::isfinite(value) || !(value >= 0))
     return Problem{"--tolerance " + text, "must be FIELD=NUMBER, e.g. torque=1e-9 or *=1e-12"};
   tolerances_[text.substr(0, equals)] = value;
   return {};

@@ -43,6 +43,15 @@ std::vector<Row> thinned(const std::vector<Row>& all, std::size_t most) {
   return out;
 }
 
+/// A row of another arm than the scene's.
+std::optional<Problem> foreign(const std::vector<Row>& rows, const scene::Scene& scene,
+                               const std::string& path) {
+  const auto n = scene.robot.chain.n();
+  const auto other = std::find_if(rows.begin(), rows.end(), [n](const Row& r) { return r.q.size() != n; });
+  if (other == rows.end()) return {};
+  return Problem{path, fmt::format("has {} joints, the robot of {} has {}", other->q.size(), scene.name, n)};
+}
+
 /// Positions of the end effector and its distance from the target, where the scene is known.
 void place_tip(Course& c) {
   if (!c.scene) return;
@@ -51,7 +60,6 @@ void place_tip(Course& c) {
   const bool has_target = goal && goal->kind != scene::GoalKind::joints;
   rbd::Workspace ws(chain);
   for (Row& r : c.rows) {
-    if (r.q.size() != chain.n()) continue;
     rbd::positions(chain, r.q, ws);
     r.tip_m = rbd::tip(chain, ws).p;
     if (has_target && std::isnan(r.error_m)) r.error_m = (r.tip_m - goal->X_WG.p).norm();
@@ -120,10 +128,8 @@ Checked<Course> course_of_csv(const CourseOptions& o) {
   }
   auto rows = CsvRows(o.path).read();
   if (!rows) return Problems{rows.error()};
-  const auto n = rows.value().front().q.size();
-  if (c.scene && n != c.scene->robot.chain.n())
-    return Problems{{o.path, fmt::format("has {} joints, the robot of {} has {}", n, o.scene_path,
-                                         c.scene->robot.chain.n())}};
+  if (c.scene)
+    if (const auto p = foreign(rows.value(), *c.scene, o.path)) return Problems{*p};
   c.rows = thinned(rows.value(), o.most_rows);
   place_tip(c);
   if (!c.scene) return c;
@@ -164,7 +170,9 @@ class RecordedRows {
     const auto rows = rows_.find(c.scene->arm);
     if (rows == rows_.end())
       return Problems{{o_.path, fmt::format("holds no state of arm {}", c.scene->arm)}};
-    c.rows = thinned(by_time(rows->second), o_.most_rows);
+    const auto all = by_time(rows->second);
+    if (const auto p = foreign(all, *c.scene, o_.path)) return Problems{*p};
+    c.rows = thinned(all, o_.most_rows);
     place_tip(c);
     c.obstacles = some_sets();
     return c;

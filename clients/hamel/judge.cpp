@@ -109,12 +109,8 @@ struct Judge::Impl {
       bodies.push_back({s.link, solid(s.shape), transform(s.shape, s.X_LS)});
       size_m.push_back(s.X_LS.p.norm() + extent(s.shape));
     }
-    for (int b = 0; b < static_cast<int>(bodies.size()); ++b)
-      for (int a = 0; a < static_cast<int>(bodies.size()); ++a) {
-        const std::pair links{bodies[static_cast<std::size_t>(a)].link,
-                              bodies[static_cast<std::size_t>(b)].link};
-        if (std::count(r.self_links.begin(), r.self_links.end(), links) > 0) self_pairs.push_back({a, b, 0});
-      }
+    for (const auto& [a, b] : r.self_pairs)
+      self_pairs.push_back({static_cast<int>(a), static_cast<int>(b), 0});
     set_levers();
   }
 

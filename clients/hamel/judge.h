@@ -38,7 +38,7 @@ struct Contact {
 /// threads at once.
 class Judge {
  public:
-  /// Links of robot.self_links must not touch each other either.
+  /// Shapes of robot.self_pairs must not touch each other either.
   explicit Judge(const scene::Robot& robot);
   ~Judge();
   Judge(Judge&&) noexcept;

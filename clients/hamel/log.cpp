@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -68,10 +69,9 @@ int each_message(const char* verb, const LogArgs& args, OnMessage&& on_message, 
     }
     const auto* m = std::get_if<record::Message>(&*item);
     if (m == nullptr) continue;
-    const double t_s = static_cast<double>(m->log_time) * 1e-9;
     const std::string& name = topics[m->channel];
-    if ((wanted != nullptr && name != wanted->name) || t_s < args.begin_s ||
-        (args.end_s >= 0 && t_s > args.end_s))
+    if ((wanted != nullptr && name != wanted->name) || m->log_time < ns(args.begin_s) ||
+        (args.end_s >= 0 && m->log_time > ns(args.end_s)))
       continue;
     any = true;
     if (!on_message(name, *m)) break;
@@ -237,6 +237,9 @@ int log_csv(const LogArgs& args) {
     if (topic == nullptr) return;
     if (const auto fields = wire::fields(*topic, m.data)) use(fields.value());
   };
+  std::error_code none;
+  if (!args.out_path.empty() && std::filesystem::equivalent(args.path, args.out_path, none))
+    return runtime::complain(verb, {{args.out_path, "is the recording itself"}});
   Columns columns;
   const auto gather = [&](const std::string& name, const record::Message& m) {
     decoded(name, m, [&](const auto& fields) { columns.add(fields); });

@@ -1,10 +1,13 @@
 /// hamel: the command line.
 
 #include <cerrno>
+#include <cmath>
 #include <system_error>
 
+#include "clients/hamel/batch_verb.h"
 #include "clients/hamel/bench.h"
 #include "clients/hamel/commands.h"
+#include "clients/hamel/explain.h"
 #include "clients/hamel/figures.h"
 #include "clients/hamel/network_verbs.h"
 #include "clients/hamel/plot.h"
@@ -34,6 +37,16 @@ void add_run_like(CLI::App& app, client::RunArgs& a) {
 }
 
 /// record and log: their options, and what to do when they were asked for.
+/// CLI11's own checks let "nan" pass.
+const CLI::Validator kFinite(
+    [](const std::string& text) {
+      double value = 0;
+      return CLI::detail::lexical_cast(text, value) && std::isfinite(value)
+                 ? std::string()
+                 : text + " is not a finite number";
+    },
+    "", "finite");
+
 class RecordVerbs {
  public:
   explicit RecordVerbs(CLI::App& app) {
@@ -42,6 +55,7 @@ class RecordVerbs {
     record_->add_option("--compression", record_args_.compression, "none, lz4 or zstd")
         ->capture_default_str();
     record_->add_option("--duration", record_args_.duration_s, "end after so many seconds")
+        ->check(kFinite)
         ->check(CLI::PositiveNumber);
     record_->add_option("--scene", record_args_.scene_path,
                         "scene of the run, kept in the recording for replays");
@@ -85,8 +99,12 @@ class RecordVerbs {
   }
   void add_part(CLI::App& verb) {
     verb.add_option("--topic", log_args_.topic, "one topic: state, command, obstacles, report, ...");
-    verb.add_option("--start", log_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
-    verb.add_option("--until", log_args_.end_s, "up to this time of the run")->type_name("SECONDS");
+    verb.add_option("--start", log_args_.begin_s, "from this time of the run on")
+        ->type_name("SECONDS")
+        ->check(kFinite);
+    verb.add_option("--until", log_args_.end_s, "up to this time of the run")
+        ->type_name("SECONDS")
+        ->check(kFinite);
   }
 
   void add_replay(CLI::App& app) {
@@ -117,10 +135,15 @@ class RecordVerbs {
         ->allow_extra_args(false)
         ->capture_default_str();
     play_->add_option("--rate", play_args_.rate, "recorded seconds a second")
+        ->check(kFinite)
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    play_->add_option("--start", play_args_.begin_s, "from this time of the run on")->type_name("SECONDS");
-    play_->add_option("--until", play_args_.end_s, "up to this time of the run")->type_name("SECONDS");
+    play_->add_option("--start", play_args_.begin_s, "from this time of the run on")
+        ->type_name("SECONDS")
+        ->check(kFinite);
+    play_->add_option("--until", play_args_.end_s, "up to this time of the run")
+        ->type_name("SECONDS")
+        ->check(kFinite);
     play_->add_flag("--loop", play_args_.loop, "begin anew at the end, until Ctrl-C");
     play_->add_flag("--control", play_args_.control,
                     "obey standard input: pause, resume, step, quit, or the keys space . q");
@@ -189,6 +212,44 @@ CLI::App* add_figures(CLI::App& app, client::FiguresArgs& a) {
   return figures;
 }
 
+CLI::App* add_explain(CLI::App& app, client::ExplainArgs& a) {
+  auto* explain =
+      app.add_subcommand("explain", "what a scene requires, what was left out and why, and what that bought");
+  explain->add_option("scene", a.scene_paths, "scene file (.textproto); several with --table")
+      ->required()
+      ->type_name("SCENE");
+  explain->add_option("--set", a.overrides, "override a field of the scene; repeat")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  auto* json = explain->add_flag("--json", a.json, "one JSON object");
+  explain
+      ->add_flag("--table", a.table,
+                 "speed against accuracy instead: full, exact and fastest fidelity of each scene, Markdown")
+      ->excludes(json);
+  explain->add_option("--seconds", a.seconds, "wall time for each measurement of cost")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  return explain;
+}
+
+CLI::App* add_batch(CLI::App& app, client::BatchArgs& a) {
+  auto* batch = app.add_subcommand("batch", "run many variations of a scene on all cores");
+  batch->add_option("file", a.path, "what to vary: .textproto (deploy/README.md), or .csv beside --scene")
+      ->required()
+      ->type_name("FILE");
+  batch->add_option("--scene", a.scene_path, "scene file, instead of the one that the file names")
+      ->type_name("SCENE");
+  batch->add_option("--set", a.overrides, "override a field of every variation; repeat")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  batch->add_option("-o,--output", a.out_path, "CSV, a row a variation; a killed batch goes on from there")
+      ->type_name("FILE");
+  batch->add_option("-j,--workers", a.workers, "threads; 0: one a core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  return batch;
+}
+
 int verbs(int argc, char** argv) {
   CLI::App app{"hamel: robot-arm dynamics and reactive planning as services on a DDS network"};
   app.require_subcommand(1);
@@ -240,6 +301,11 @@ int verbs(int argc, char** argv) {
   client::FiguresArgs figures_args;
   const auto* figures = add_figures(app, figures_args);
 
+  client::ExplainArgs explain_args;
+  const auto* explain = add_explain(app, explain_args);
+  client::BatchArgs batch_args;
+  const auto* batch = add_batch(app, batch_args);
+
   RecordVerbs recordings(app);
   client::BenchVerb bench(app);
   const client::NetworkVerbs network(app);  // adds to bench
@@ -250,6 +316,8 @@ int verbs(int argc, char** argv) {
   if (const auto code = network.run()) return *code;
   if (plot->parsed()) return client::plot(plot_args);
   if (figures->parsed()) return client::figures(figures_args);
+  if (explain->parsed()) return client::explain(explain_args);
+  if (batch->parsed()) return client::batch(batch_args);
   if (trade->parsed()) return client::trade(trade_args);
   if (run->parsed()) return client::run(run_args);
   if (up->parsed()) return client::up(up_args);

@@ -68,7 +68,7 @@ class Player {
     std::optional<std::uint64_t> first;
     while (const auto message = in_.next()) {
       if (!first) {
-        first = args_.begin_s > 0 ? static_cast<std::uint64_t>(args_.begin_s * 1e9) : message->time;
+        first = args_.begin_s > 0 ? ns(args_.begin_s) : message->time;
         origin_ = Clock::now();
       }
       time_s_ = static_cast<double>(message->time) * 1e-9;

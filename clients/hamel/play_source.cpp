@@ -15,8 +15,6 @@ namespace hamel::client {
 
 namespace {
 
-std::uint64_t ns(double t_s) { return static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * 1e9)); }
-
 class RecordedSource final : public PlaySource {
  public:
   RecordedSource(record::IndexedReader in, const PlayArgs& args) : path_(args.path), in_(std::move(in)) {

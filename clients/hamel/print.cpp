@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/scene/reduce.h"
+
 namespace hamel::client {
 
 namespace {
@@ -40,6 +42,8 @@ void print_json(const scene::Scene& scene, const Outcome& o) {
   j["iterations_mean"] = number(o.summary.iterations_mean);
   j["iterations_max"] = o.summary.iterations_max;
   j["residual_max_Nm"] = number(o.summary.residual_max_Nm);
+  j["fidelity"] = scene::to_string(scene.reduce.fidelity);
+  j["reductions"] = scene::names_in_force(scene);
   j["steps"] = o.summary.steps;
   j["substepped"] = o.summary.substepped;
   j["commands_missed"] = o.summary.commands_missed;
@@ -75,6 +79,7 @@ void print_table(const scene::Scene& scene, const Outcome& o, const std::string&
     line("contacts", fmt::format("{}", o.contacts));
     line("path length", si(o.path_length_m, "m"));
   }
+  line("reductions", scene::names_in_force(scene));
   const bool lost = o.summary.energy_drift_rel > kDriftOfConcern;
   line("energy drift", fmt::format("{:.2e} of the energy scale{}", o.summary.energy_drift_rel,
                                    lost ? ": the step is too long for this motion, do not trust it" : ""));

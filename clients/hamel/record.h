@@ -1,6 +1,8 @@
 #pragma once
 /// The verbs about recordings.
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -27,6 +29,11 @@ int log_info(const LogArgs& args);
 int log_cat(const LogArgs& args);
 int log_csv(const LogArgs& args);
 int log_recover(const LogArgs& args);
+
+/// A time of the command line [s] in the nanoseconds of a recording; before its beginning: 0.
+inline std::uint64_t ns(double t_s) {
+  return static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * 1e9));
+}
 
 struct PlayArgs {
   runtime::BusOptions bus;

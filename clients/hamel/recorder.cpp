@@ -189,6 +189,15 @@ Result<std::unique_ptr<Recorder>, Problem> open_recorder(bus::Node& node, const 
   if (args.record_path.empty()) return std::unique_ptr<Recorder>();
   const auto compression = record::compression_from(args.compression);
   if (!compression) return compression.error();
+  const auto place = [](const std::string& path) {
+    std::error_code none;
+    return std::filesystem::weakly_canonical(path, none);
+  };
+  const std::string stream = scene.perception.stream ? scene.perception.stream->path : "";
+  for (const auto& [path, what] :
+       {std::pair{stream, "the scene's obstacle stream"}, {args.csv_path, "the file of --csv"}})
+    if (!path.empty() && place(path) == place(args.record_path))
+      return Problem{"--record " + args.record_path, fmt::format("is {}", what)};
   return Recorder::open(node, {args.record_path, compression.value(), &scene, scene::to_string(pace)});
 }
 

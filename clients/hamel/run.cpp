@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "clients/hamel/chosen.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/print.h"
 #include "clients/hamel/recorder.h"
@@ -25,10 +26,11 @@ int conclude(const scene::Scene& scene, Monitor& monitor, bool interrupted, cons
 
 }  // namespace
 
-int run(const RunArgs& args) {
+int run(const RunArgs& asked) {
+  RunArgs args = asked;
   runtime::StopSignal stop;
   runtime::start_log("hamel", args.run.verbose);
-  const auto scene = runtime::load(args.run);
+  const auto scene = load_chosen(args.run);
   if (!scene) return runtime::complain("hamel run", scene.error());
   const scene::Scene& s = scene.value();
   for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);

@@ -24,6 +24,9 @@ class Loader {
                          fmt::format("at byte {}: {}; a replay needs the whole of it", d->offset, d->what)}};
       if (const auto* c = std::get_if<record::Channel>(&*item)) topics_[c->id] = c->topic;
       if (const auto* a = std::get_if<record::Attachment>(&*item)) files_.add(*a);
+      if (const auto* m = std::get_if<record::Metadata>(&*item); m && m->name == record::kRecovered)
+        return Problems{
+            {options_.path, "was recovered with messages missing in between; a replay needs all of them"}};
       if (const auto* m = std::get_if<record::Message>(&*item)) add(*m);
     }
     auto scene = load_scene(files_, options_.path, options_.scene_path, options_.overrides);

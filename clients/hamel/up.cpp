@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "clients/hamel/chosen.h"
 #include "clients/hamel/commands.h"
 #include "clients/hamel/print.h"
 #include "clients/hamel/recorder.h"
@@ -80,10 +81,11 @@ std::string buses(const RunArgs& args, const scene::Scene& s) {
 
 }  // namespace
 
-int up(const RunArgs& args) {
+int up(const RunArgs& asked) {
+  RunArgs args = asked;
   runtime::StopSignal stop;
   runtime::start_log("hamel", args.run.verbose);
-  const auto scene = runtime::load(args.run);
+  const auto scene = load_chosen(args.run);
   if (!scene) return runtime::complain("hamel up", scene.error());
   const scene::Scene& s = scene.value();
   for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);

@@ -289,6 +289,31 @@ void read_place(const text::Scene& m, SceneParts& out) {
     out.missing.push_back({"gravity_mps2", "has a number that is not finite"});
 }
 
+void read_reduce(const Fields& read, scene::ReduceOptions& o) {
+  read("locked", o.locked);
+  read("plane", o.plane);
+  read("gravity", o.gravity);
+  read("obstacles", o.obstacles);
+  read("links", o.links);
+  read("rate", o.rate);
+  read("step", o.step);
+}
+
+void read_accuracy(const Fields& read, scene::Accuracy& o) {
+  read("joint_error_rad", o.joint_error_rad);
+  read("energy_error_rel", o.energy_error_rel);
+  read("horizon_s", o.horizon_s);
+  read("obstacle_error_m", o.obstacle_error_m);
+}
+
+scene::Lock read_lock(const Fields& read) {
+  scene::Lock lock;
+  read.require("joint");
+  read("joint", lock.joint);
+  if (read.given("value")) read("value", lock.value.emplace());
+  return lock;
+}
+
 }  // namespace
 
 SceneParts to_parts(const text::Scene& m) {
@@ -306,6 +331,11 @@ SceneParts to_parts(const text::Scene& m) {
   read_perception(m.perception(), out);
   read("duration_s", out.duration_s);
   read("stop", out.stop);
+  read("fidelity", out.reduce.fidelity);
+  read_reduce({m.reduce(), "reduce.", out.missing}, out.reduce);
+  read_accuracy({m.accuracy(), "accuracy.", out.missing}, out.accuracy);
+  for (int i = 0; i < m.locked_size(); ++i)
+    out.locked.push_back(read_lock({m.locked(i), "locked[" + std::to_string(i) + "].", out.missing}));
   return out;
 }
 

@@ -29,6 +29,9 @@ struct SceneParts {
   bool stream_start_given = false;
   double duration_s = 10;
   scene::StopRule stop = scene::StopRule::when_reached;
+  scene::ReduceOptions reduce;
+  scene::Accuracy accuracy;
+  std::vector<scene::Lock> locked;
   Problems missing;
 };
 

@@ -11,6 +11,7 @@
 #include "common/files/urdf.h"
 #include "common/rbd/planar_chain.h"
 #include "common/scene/self_links.h"
+#include "common/scene/reduce.h"
 
 namespace hamel::files {
 namespace {
@@ -107,7 +108,7 @@ class Loader {
       allowed.emplace_back(std::min(index(a), index(b)), std::max(index(a), index(b)));
     }
     if (!parts.self_collision.value_or(!rbd::is_planar(robot.chain))) return;
-    robot.self_links = scene::self_links(robot, allowed).watched;
+    scene::watch(robot, scene::self_links(robot, allowed).watched);
   }
 
   /// Puts the robot to the rest and checks the rules.  Without a robot a stand-in takes its place, so that
@@ -132,7 +133,10 @@ class Loader {
                    std::move(parts.perception),
                    parts.bus,
                    parts.duration_s,
-                   parts.stop};
+                   parts.stop,
+                   parts.reduce,
+                   parts.accuracy,
+                   std::move(parts.locked)};
     if (s.name.empty()) s.name = std::filesystem::path(path_).stem().string();
     Problems broken = scene::problems(s);
     std::erase_if(broken, [&](const Problem& p) { return is_said(p.where, s, real); });
@@ -146,7 +150,8 @@ class Loader {
     if (path == "perception.stream.path")
       return s.perception.stream->samples.empty() && s.perception.stream->empty_s.empty();
     const bool of_joints = path.starts_with("q0") || path.starts_with("qd0") ||
-                           path.starts_with("goal.joints") || path == "planner.kc";
+                           path.starts_with("goal.joints") || path.starts_with("locked") ||
+                           path == "planner.kc";
     return of_joints && !real_robot;
   }
 
@@ -182,8 +187,14 @@ class Loader {
 
 }  // namespace
 
-Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+Checked<scene::Scene> read_scene(const std::string& path, const std::vector<std::string>& overrides) {
   return Loader(path, overrides).load();
+}
+
+Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  auto scene = read_scene(path, overrides);
+  if (scene) scene::reduce(scene.value());
+  return scene;
 }
 
 Problems set_planner(const std::vector<std::string>& assignments, scene::PlannerOptions& options) {

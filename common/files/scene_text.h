@@ -18,7 +18,11 @@ namespace hamel::files {
 /// tabs
 ///         count to the next multiple of 8) or "--set override"; those of a robot or stream name that file
 /// Reads the robot's URDF and the stream's file too.  Never throws for what a file holds.
+/// The scene comes reduced to what it requires (common/scene/reduce.h): a pure function of the scene, so
+/// that every process that loads the same file models the same.
 Checked<scene::Scene> load_scene(const std::string& path, const std::vector<std::string>& overrides = {});
+/// The same scene as written.
+Checked<scene::Scene> read_scene(const std::string& path, const std::vector<std::string>& overrides = {});
 
 /// Changes planner options by assignments such as "kc=1" or "method=gyro", in order; every problem of them
 /// and every rule the outcome violates.

@@ -52,8 +52,9 @@ class Builder {
     warn_of_bare_links();
     auto chain = model::build(spec_);
     if (!chain) return chain.error();
-    return scene::Robot{spec_.name, std::move(text), std::move(chain).value(), std::move(shapes_),
-                        std::move(warnings_)};
+    return scene::Robot{spec_.name,         std::move(text),      std::move(chain).value(),
+                        std::move(shapes_), std::move(warnings_), {},
+                        fixed_joints_};
   }
 
  private:
@@ -67,10 +68,12 @@ class Builder {
     if (link.child_joints.empty()) end_of_[carrier] = link.name;
     const urdf::Joint* moving = nullptr;
     for (const urdf::JointSharedPtr& j : link.child_joints) {
-      if (j->type == urdf::Joint::FIXED)
+      if (j->type == urdf::Joint::FIXED) {
+        ++fixed_joints_;
         add(*model_.getLink(j->child_link_name), carrier, X_NL * pose_of(*j));
-      else
+      } else {
         moving = j.get();
+      }
     }
     if (moving != nullptr) add_joint(*moving, X_NL);
   }
@@ -142,6 +145,7 @@ class Builder {
   model::ChainSpec spec_;
   std::vector<scene::LinkShape> shapes_;
   std::vector<std::string> warnings_;
+  int fixed_joints_ = 0;
   std::map<std::string, lie::Pose> frames_;  // of every link, in its carrier's
   std::map<int, int> ends_;                  // links without children, by carrier
   std::map<int, std::string> end_of_;        // one of them

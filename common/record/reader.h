@@ -140,6 +140,9 @@ struct Recovery {
   bool complete = false;  ///< the input had its footer
 };
 
+/// Name of the metadata that recover() adds where messages are missing between those it found.
+inline constexpr const char* kRecovered = "recovered";
+
 /// Copies everything that is whole in `in` to a new file with a new index; fails where `in` is no MCAP file
 /// or `out` cannot be written.
 Result<Recovery, Problem> recover(const std::string& in, const std::string& out, Compression compression);

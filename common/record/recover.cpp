@@ -22,18 +22,24 @@ class Copy {
     channels_[c.id] = out_.add(copy);
   }
   void operator()(const Message& m) {
+    hole = hole || (damaged_ && found.messages > 0);
     Message copy = m;
     copy.channel = channels_[m.channel];
     found.messages += out_.write(copy, {}) ? 1 : 0;
   }
   void operator()(const Attachment& a) { found.attachments += out_.write(a) ? 1 : 0; }
   void operator()(const Metadata& m) { found.metadata += out_.write(m) ? 1 : 0; }
-  void operator()(const Damage& d) { found.damages.push_back(d); }
+  void operator()(const Damage& d) {
+    found.damages.push_back(d);
+    damaged_ = found.messages > 0;
+  }
 
   Recovery found;
+  bool hole = false;  ///< messages follow a damage that others came before
 
  private:
   Writer& out_;
+  bool damaged_ = false;
   std::map<std::uint16_t, std::uint16_t> schemas_, channels_;
 };
 
@@ -49,6 +55,9 @@ Result<Recovery, Problem> recover(const std::string& in, const std::string& out,
   if (!writer) return writer.error();
   Copy copy(*writer.value());
   while (const auto item = reader.value().next()) std::visit(copy, *item);
+  if (copy.hole)
+    writer.value()->write(
+        Metadata{kRecovered, {{"hole", std::to_string(copy.found.damages.size()) + " damages"}}});
   if (!writer.value()->close()) return *writer.value()->problem();
   copy.found.complete = reader.value().complete();
   return std::move(copy.found);

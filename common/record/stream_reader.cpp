@@ -43,6 +43,12 @@ Result<StreamReader, Problem> StreamReader::open(const std::string& path) {
     return r;
   }
   if (!r.find_chunk(0)) return Problem{path, "is no MCAP file"};
+  // where only the magic is broken its header follows all the same, and attachments before the first chunk
+  Bytes head;
+  if (r.file_->read(kMagic.size(), kFrame, head)) {
+    Cursor in(head);
+    if (in.get<Op>() == Op::header && in.get<std::uint64_t>() <= r.at_) r.at_ = kMagic.size();
+  }
   r.whole_ = false;
   r.waiting_.push_back(Damage{0, "does not begin as an MCAP file"});
   return r;

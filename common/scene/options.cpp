@@ -194,6 +194,39 @@ const char* to_string(Unreachable v) {
   return "?";
 }
 
+Problems problems(const Accuracy& o) {
+  Rules r("accuracy.");
+  r.positive_or_inf("joint_error_rad", o.joint_error_rad);
+  r.positive_or_inf("energy_error_rel", o.energy_error_rel);
+  r.not_negative("horizon_s", o.horizon_s);
+  r.positive("obstacle_error_m", o.obstacle_error_m);
+  return r.take();
+}
+
+const char* to_string(Fidelity v) {
+  switch (v) {
+    case Fidelity::full:
+      return "full";
+    case Fidelity::exact:
+      return "exact";
+    case Fidelity::fastest:
+      return "fastest";
+  }
+  return "?";
+}
+
+const char* to_string(Choice v) {
+  switch (v) {
+    case Choice::automatic:
+      return "automatic";
+    case Choice::off:
+      return "off";
+    case Choice::on:
+      return "on";
+  }
+  return "?";
+}
+
 const char* to_string(Pace v) {
   switch (v) {
     case Pace::lockstep:

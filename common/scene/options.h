@@ -91,12 +91,41 @@ struct PlannerOptions {
   double ramp_s = 0.2;  ///< after a restart without memory the command ramps in over it, >= 0
 };
 
+/// How much of what a scene writes is computed.
+enum class Fidelity : std::uint8_t {
+  full,    ///< all of it, as written
+  exact,   ///< what changes no result is left out
+  fastest  ///< what changes results by less than the scene's accuracy is left out too
+};
+enum class Choice : std::uint8_t { automatic, off, on };  ///< as the fidelity says; never; whatever it says
+
+/// What a scene allows to be reduced (reduce.h).
+struct ReduceOptions {
+  Fidelity fidelity = Fidelity::exact;
+  Choice locked = Choice::automatic;     ///< exact: locked joints become part of the link that carries them
+  Choice plane = Choice::automatic;      ///< exact: SE(2) where the arm is planar
+  Choice gravity = Choice::automatic;    ///< exact: none where it works on no joint
+  Choice obstacles = Choice::automatic;  ///< exact: those that can never matter are culled, set by set
+  Choice links = Choice::automatic;      ///< exact but for their reports: links far from all are not measured
+  Choice rate = Choice::automatic;       ///< bounded: perception no faster than the obstacles need
+  Choice step = Choice::automatic;       ///< bounded: tier and step chosen for the accuracy
+};
+
+/// What `fastest` may cost, and what it is judged by.
+struct Accuracy {
+  double joint_error_rad = 1e-3;   ///< of any joint at any time of the horizon [rad or m], > 0
+  double energy_error_rel = kInf;  ///< of the energy scale, > 0
+  double horizon_s = 0;            ///< 0: the run; >= 0
+  double obstacle_error_m = 1e-3;  ///< how far an obstacle's surface may be off, > 0
+};
+
 enum class Pace : std::uint8_t { lockstep, realtime };
 enum class StopRule : std::uint8_t { at_duration, when_reached };
 
 /// Every violated rule, as "dynamics.dt_s" / "= -1, must be > 0".  Empty when valid.
 Problems problems(const DynamicsOptions& o);
 Problems problems(const PlannerOptions& o);
+Problems problems(const Accuracy& o);
 
 /// The name the user writes, e.g. to_string(Tier::gauss) == "gauss".
 const char* to_string(Tier v);
@@ -110,6 +139,8 @@ const char* to_string(Mapping v);
 const char* to_string(PairPolicy v);
 const char* to_string(Unreachable v);
 const char* to_string(Pace v);
+const char* to_string(Fidelity v);
+const char* to_string(Choice v);
 const char* to_string(StopRule v);
 
 }  // namespace hamel::scene

@@ -3,6 +3,7 @@
 #include <numbers>
 #include <set>
 
+#include "common/scene/locked.h"
 #include "common/scene/rules.h"
 
 namespace hamel::scene {
@@ -113,11 +114,17 @@ void check_stream(Rules& r, const PerceptionOptions& o) {
   r.positive("stream.glitch_mps", s.glitch_mps);
   if (!std::isfinite(s.start_s)) r.fail("stream.start_s", "is not finite");
   if (s.samples.empty() && s.empty_s.empty()) r.fail("stream.path", "has no samples");
-  double first_s = std::numeric_limits<double>::infinity();
-  for (const StreamSample& sample : s.samples) first_s = std::min(first_s, sample.t_s);
-  for (const double t_s : s.empty_s) first_s = std::min(first_s, t_s);
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  double first_s = inf, last_s = -inf;
+  const auto span = [&](double t_s) { first_s = std::min(first_s, t_s), last_s = std::max(last_s, t_s); };
+  for (const StreamSample& sample : s.samples) span(sample.t_s);
+  for (const double t_s : s.empty_s) span(t_s);
+  last_s = std::min(last_s, s.until_s);
   r.must(s.until_s >= first_s || std::isinf(first_s), "stream.until_s", s.until_s,
          ">= the time of the first sample, " + std::to_string(first_s));
+  if (!s.loop && last_s >= first_s && std::isfinite(s.start_s))
+    r.must(s.start_s <= last_s, "stream.start_s", s.start_s,
+           "<= the time of the last sample, " + std::to_string(last_s));
   std::set<std::uint32_t> ids;
   for (const StreamSample& sample : s.samples) ids.insert(sample.id);
   if (ids.size() + o.obstacles.size() > kMaxObstacles)
@@ -206,6 +213,8 @@ Problems problems(const Scene& s) {
   append(all, problems(s.dynamics));
   append(all, problems(s.planner));
   append(all, problems(s.perception));
+  append(all, problems(s.accuracy));
+  append(all, lock_problems(s));
   return all;
 }
 

@@ -33,8 +33,10 @@ struct Robot {
   std::vector<std::string> warnings =
       {};                    ///< what was read otherwise than written, e.g. "link hand: mesh left out"
   std::string spheres = {};  ///< text of the sidecar with collision spheres; empty: none
-  /// Links that must not touch each other, nearer to the base first (-1: the base); see self_links().
-  std::vector<std::pair<int, int>> self_links = {};
+  int fixed_joints = 0;      ///< of the file, lumped
+  /// Indices of shapes that must not touch each other, that of the link nearer to the base first; see
+  /// watch().
+  std::vector<std::pair<std::size_t, std::size_t>> self_pairs = {};
 };
 
 enum class GoalKind : std::uint8_t { position, pose, joints };
@@ -98,6 +100,24 @@ struct Buses {
   std::string dynamics, planner, perception;
 };
 
+/// A joint that does not move in this scene.
+struct Lock {
+  std::string joint;            ///< its name
+  std::optional<double> value;  ///< where it stays [rad or m]; none: its start
+};
+
+/// One thing that a scene does not need, and what became of it.
+struct Reduction {
+  std::string name;   ///< of the field in `reduce { }`, or "fixed"
+  bool exact = true;  ///< false: the result changes, by `bound` at most
+  bool in_force = false;
+  std::string what, why;  ///< "2 of 9 joints frozen"; why it may be done, or why it is not
+  double before = 0, after = 0;
+  std::string unit;  ///< of before and after
+  double bound = 0;  ///< of a bounded one that is in force
+  std::string bound_unit = {};
+};
+
 /// One run.
 struct Scene {
   std::string name;
@@ -113,6 +133,10 @@ struct Scene {
   Buses bus;
   double duration_s = 10;  ///< length of the run, > 0
   StopRule stop = StopRule::when_reached;
+  ReduceOptions reduce = {};
+  Accuracy accuracy = {};
+  std::vector<Lock> locked = {};
+  std::vector<Reduction> reductions = {};  ///< what reduce() did and did not; empty: the scene as written
 };
 
 /// Every violated rule across the scene: sizes, options, shapes, streams.  Empty when valid.  `where` is the

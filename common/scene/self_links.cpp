@@ -74,4 +74,13 @@ SelfLinks self_links(const Robot& robot, const std::vector<std::pair<int, int>>&
   return out;
 }
 
+void watch(Robot& robot, const std::vector<std::pair<int, int>>& links) {
+  robot.self_pairs.clear();
+  for (std::size_t b = 0; b < robot.shapes.size(); ++b)
+    for (std::size_t a = 0; a < robot.shapes.size(); ++a) {
+      const std::pair both{robot.shapes[a].link, robot.shapes[b].link};
+      if (std::count(links.begin(), links.end(), both) > 0) robot.self_pairs.emplace_back(a, b);
+    }
+}
+
 }  // namespace hamel::scene

@@ -21,4 +21,7 @@ struct SelfLinks {
 /// overlap by design.  For start-up: some milliseconds.
 SelfLinks self_links(const Robot& robot, const std::vector<std::pair<int, int>>& allowed = {});
 
+/// Sets robot.self_pairs to the shapes of these links, the one nearer to the base first.
+void watch(Robot& robot, const std::vector<std::pair<int, int>>& links);
+
 }  // namespace hamel::scene

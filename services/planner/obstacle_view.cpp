@@ -3,17 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/scene/reduce.h"
+
 namespace hamel::planner {
 
 namespace {
 
 constexpr std::size_t kMaxWaiting = 64;  ///< sets ahead of time kept for one source
 constexpr std::size_t kMaxSources = 16;
+constexpr std::size_t kWorthwhile = 2;  ///< a lone obstacle is the nearest anyway
+constexpr double kHorizon_s = 5;        ///< a moving obstacle is culled when it is out of reach for so long
 
 }  // namespace
 
+ObstacleView::ObstacleView(const scene::Scene& scene)
+    : cull_(scene::wanted(scene.reduce, scene.reduce.obstacles, true)),
+      skip_links_(scene::wanted(scene.reduce, scene.reduce.links, false)) {
+  if (cull_ || skip_links_) reach_.emplace(scene.robot, scene.planner);
+}
+
 void ObstacleView::begin(std::uint64_t incarnation) {
   incarnation_ = incarnation;
+  changed_ = true;
   std::erase_if(sources_, [&](const auto& s) {
     return s.second.empty() || s.second.front().incarnation < incarnation;
   });
@@ -23,6 +34,7 @@ void ObstacleView::add(const wire::ObstacleSet& set) {
   if (set.incarnation < incarnation_) return;
   if (!sources_.contains(set.source) && sources_.size() >= kMaxSources) return;
   Queue& q = sources_[set.source];
+  changed_ = true;
   if (!q.empty() && set.incarnation < q.back().incarnation) return;
   if (!q.empty() && set.incarnation > q.back().incarnation) q.clear();
   const auto at = std::lower_bound(q.begin(), q.end(), set.t_s,
@@ -46,24 +58,50 @@ bool ObstacleView::covers(double t_s) const {
   });
 }
 
-double ObstacleView::at(double t_s, std::vector<geometry::Obstacle>& out, wire::Causes& causes) {
-  out.clear();
+double ObstacleView::at(double t_s, const Eigen::VectorXd& q, wire::Causes& causes) {
   double oldest = 0;
   bool any = false;
-  set_ = 1469598103934665603ull;  // FNV-1a
-  for (auto& [source, q] : sources_) {
-    while (q.size() > 1 && q[1].t_s <= t_s) q.pop_front();
-    if (!current(q)) continue;
+  for (auto& [source, queue] : sources_) {
+    while (queue.size() > 1 && queue[1].t_s <= t_s) {
+      queue.pop_front();
+      changed_ = true;
+    }
+    if (!current(queue)) continue;
     any = true;
-    const wire::ObstacleSet& s = q.front();
-    out.insert(out.end(), s.obstacles.begin(), s.obstacles.end());
+    const wire::ObstacleSet& s = queue.front();
     causes.add(wire::ServiceKind::perception, s.sequence_number);
-    for (const std::uint64_t part :
-         {std::uint64_t{source}, std::uint64_t{s.incarnation}, std::uint64_t{s.sequence_number}})
-      set_ = (set_ ^ part) * 1099511628211ull;
     if (std::isfinite(s.next_t_s)) oldest = std::max(oldest, t_s - s.t_s);
   }
+  if (changed_) put_together();
+  const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q);
+  std::uint64_t which = 1;  // of the three vectors is shown
+  shown_ = all_;
+  if (sound && cull_ && kept_.size() < kWorthwhile) {
+    shown_ = kept_;
+    which = 2;
+  } else if (sound && cull_) {
+    if (near_is_old_ || !reach_->stays_near(q)) {
+      reach_->sift_near(q, kept_, near_);
+      ++sifts_;
+    }
+    near_is_old_ = false;
+    shown_ = near_;
+    which = 3;
+  }
+  set_ = 4 * sifts_ + which;
+  floor_shown_ = sound && skip_links_ ? std::span<const double>(floor_m_) : std::span<const double>();
   return any ? oldest : std::numeric_limits<double>::infinity();
+}
+
+void ObstacleView::put_together() {
+  changed_ = false;
+  near_is_old_ = true;
+  ++sifts_;
+  all_.clear();
+  for (const auto& [source, queue] : sources_)
+    if (current(queue))
+      all_.insert(all_.end(), queue.front().obstacles.begin(), queue.front().obstacles.end());
+  if (reach_) reach_->sift(all_, kHorizon_s, kept_, floor_m_);
 }
 
 }  // namespace hamel::planner

@@ -52,7 +52,8 @@ PlannerService::PlannerService(bus::Node& node, const scene::Scene& scene, const
       obstacles_in_(node),
       goal_in_(node),
       mode_in_(node),
-      presence_(node, wire::ServiceKind::planner, scene.arm) {
+      presence_(node, wire::ServiceKind::planner, scene.arm),
+      view_(scene_) {
   epoch_ += std::uint64_t{config.strength} << 32;
   if (goal_) planner_.set_goal(*goal_);
   report_.method = scene::to_string(scene.planner.method);
@@ -182,7 +183,7 @@ void PlannerService::plan(Time now) {
   qd_ = state_.velocity;
   command_.caused_by.size = 0;
   command_.caused_by.add(wire::ServiceKind::dynamics, state_.step);
-  obstacle_age_s_ = view_.at(state_.t_s, obstacles_, command_.caused_by);
+  obstacle_age_s_ = view_.at(state_.t_s, q_, command_.caused_by);
   if (goal_) command_.caused_by.add(wire::ServiceKind::client, goal_->id);
 
   if (config_.pace == scene::Pace::realtime) {
@@ -197,14 +198,19 @@ void PlannerService::plan(Time now) {
                  .dt_s = period_s,
                  .q = q_,
                  .qd = qd_,
-                 .obstacles = obstacles_,
+                 .obstacles = view_.obstacles(),
                  .obstacle_age_s = obstacle_age_s_,
                  .obstacle_set = view_.set(),
                  .state_age_s = lockstep ? 0 : std::chrono::duration<double>(now - last_state_).count(),
-                 .obstacles_expected = true};
+                 .obstacles_expected = true,
+                 .link_floor_m = view_.link_floor_m()};
   take_escape();
   planner_.plan(in, output_);
-  if (output_.report.escape_asked) ask_escape(in);
+  if (output_.report.escape_asked) {
+    Input whole = in;  // the way out may lead far
+    whole.obstacles = view_.all();
+    ask_escape(whole);
+  }
   memory_step_ = state_.step;
   ++cycles_;
   cycle_s_ = std::chrono::duration<double>(runtime::Clock::now() - began).count();

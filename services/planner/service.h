@@ -76,7 +76,6 @@ class PlannerService final : public runtime::Service {
   wire::TorqueCommand command_;
   wire::PlannerReport report_;
   ObstacleView view_;
-  std::vector<geometry::Obstacle> obstacles_;
   double obstacle_age_s_ = 0;
   Eigen::VectorXd q_, qd_;
 

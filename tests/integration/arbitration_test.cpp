@@ -6,35 +6,22 @@
 
 #include <filesystem>
 
-#include "common/files/scene_text.h"
 #include "common/runtime/options.h"
 #include "services/dynamics/service.h"
 #include "services/perception/service.h"
 #include "services/planner/service.h"
+#include "tests/support/services.h"
 
 using namespace hamel;
 using runtime::Clock;
+using test::made;
+using test::node;
 using namespace std::chrono_literals;
 
 namespace {
 
-scene::Scene load(std::vector<std::string> overrides = {}) {
-  auto s = files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/four_link_avoid.textproto",
-                             overrides);
-  if (!s) throw std::runtime_error(to_string(s.error()[0]));
-  return std::move(s).value();
-}
-
-std::unique_ptr<bus::Node> node(std::uint32_t domain) {
-  bus::NodeOptions o;
-  o.domain = domain;
-  return std::move(bus::open(o)).value();
-}
-
-template <class T>
-T made(Result<T, Problem> r) {
-  if (!r) throw std::runtime_error(to_string(r.error()));
-  return std::move(r).value();
+scene::Scene load(const std::vector<std::string>& overrides = {}) {
+  return test::shipped("four_link_avoid", overrides);
 }
 
 /// A planner of the test's own: one writer of commands.

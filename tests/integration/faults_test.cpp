@@ -7,13 +7,15 @@
 #include <deque>
 #include <random>
 
-#include "common/files/scene_text.h"
 #include "services/dynamics/service.h"
 #include "services/perception/service.h"
 #include "services/planner/service.h"
+#include "tests/support/services.h"
 
 using namespace hamel;
 using runtime::Clock;
+using test::made;
+using test::node;
 using namespace std::chrono_literals;
 
 namespace {
@@ -24,18 +26,6 @@ struct Faults {
   int delay_ms = 0, jitter_ms = 0;             ///< jitter: later ones overtake earlier ones
   double cut_from_s = 1e9, cut_until_s = 1e9;  ///< nothing passes in between
 };
-
-std::unique_ptr<bus::Node> node(std::uint32_t domain) {
-  bus::NodeOptions o;
-  o.domain = domain;
-  return std::move(bus::open(o)).value();
-}
-
-template <class T>
-T made(Result<T, Problem> r) {
-  if (!r) throw std::runtime_error(to_string(r.error()));
-  return std::move(r).value();
-}
 
 /// Carries one topic one way.
 class Wire {
@@ -75,10 +65,7 @@ struct Told {
 };
 
 Told run(const Faults& faults, scene::Pace pace, double duration_s, std::uint32_t domain) {
-  auto s = files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/four_link_avoid.textproto",
-                             {"planner.method=gyro", "stop=when_reached"});
-  if (!s) throw std::runtime_error(to_string(s.error()[0]));
-  scene::Scene scene = std::move(s).value();
+  scene::Scene scene = test::shipped("four_link_avoid", {"planner.method=gyro", "stop=when_reached"});
   scene.duration_s = duration_s;
   const auto here = node(domain), there = node(domain + 1);
   wire::Subscription<wire::RunSummary> summaries(*here);
@@ -171,8 +158,7 @@ TEST(Faults, InLockstepACutWithoutEndIsTheEndWithAName) {
 /// A stranger floods the command topic with valid and broken messages: refused and counted, nothing grows.
 TEST(Flood, OfCommandsIsRefusedAndTheArmGoesOn) {
   const auto n = node(58);
-  auto s = files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/four_link_avoid.textproto", {});
-  const scene::Scene scene = std::move(s).value();
+  const scene::Scene scene = test::shipped("four_link_avoid");
   auto arm =
       made(dynamics::DynamicsService::make(*n, scene, {.pace = scene::Pace::realtime, .incarnation = 3}));
   const auto stranger = n->writer(topics::kCommand);

@@ -103,7 +103,7 @@ TEST(SceneText, FourLinkAvoidIsSetS1) {
 
 TEST(SceneText, DefaultsAreThoseOfTheOptions) {
   const Scratch file(kRobot);
-  const auto scene = load_scene(file.path());
+  const auto scene = read_scene(file.path());
   ASSERT_TRUE(scene) << to_string(scene.error().front());
   const scene::Scene& s = scene.value();
   EXPECT_EQ(s.planner.kv, scene::PlannerOptions{}.kv);
@@ -122,11 +122,13 @@ TEST(SceneText, EveryNumberOfTheOptionsCanBeSet) {
   const auto text = read_file(std::string(HAMEL_SOURCE_DIR) + "/common/scene/options.h");
   ASSERT_TRUE(text);
   const std::regex member("\n  (double|int) (\\w+) = ");
-  const std::size_t planner = text.value().find("struct PlannerOptions");
+  const auto begin = [&](const char* name) { return text.value().find(name); };
+  const std::size_t planner = begin("struct PlannerOptions"), accuracy = begin("struct Accuracy");
   int count = 0;
   for (std::sregex_iterator m(text.value().begin(), text.value().end(), member), end; m != end;
        ++m, ++count) {
-    const std::string part = static_cast<std::size_t>(m->position()) < planner ? "dynamics." : "planner.";
+    const auto at = static_cast<std::size_t>(m->position());
+    const std::string part = at < planner ? "dynamics." : at < accuracy ? "planner." : "accuracy.";
     const std::string set = part + m->str(2) + "=-7";  // breaks a rule of every one of them
     const auto scene = load_scene(file.path(), {set});
     ASSERT_FALSE(scene) << set;
@@ -277,7 +279,7 @@ TEST(Overrides, ReplaceValuesOfEveryType) {
                        "arm=3",
                        "dynamics.bus=\"cyclonedds\"",
                        "gravity_mps2=[0, 0, -1]"};
-  const auto scene = load_scene(kScenes + "four_link_avoid.textproto", sets);
+  const auto scene = read_scene(kScenes + "four_link_avoid.textproto", sets);
   ASSERT_TRUE(scene) << to_string(scene.error().front());
   const scene::Scene& s = scene.value();
   EXPECT_EQ(s.planner.method, scene::Method::gyro);

@@ -213,6 +213,42 @@ TEST_P(EveryCompression, AFlippedBitIsSaidAndTheRestIsRead) {
   EXPECT_LE(most_lost, 60u) << "one chunk";
 }
 
+TEST_P(EveryCompression, AFlippedBitOfTheMagicCostsNothing) {
+  const std::string file = path("sound"), bad = path("flipped");
+  write_file(file, GetParam(), 600);
+  const Contents sound = read(file);
+  ASSERT_GT(sound.attachments, 0u);
+  for (std::size_t at = 0; at < 8; ++at) {
+    std::string changed = load(file);
+    changed[at] = static_cast<char>(changed[at] ^ 4);
+    store(bad, changed);
+    const Contents found = read(bad);
+    EXPECT_FALSE(found.damages.empty());
+    EXPECT_EQ(found.messages.size(), 600u);
+    EXPECT_EQ(found.attachments, sound.attachments);
+  }
+}
+
+TEST_P(EveryCompression, ARecoveredFileRemembersItsHole) {
+  const std::string file = path("sound"), bad = path("holed"), out = path("mended");
+  write_file(file, GetParam(), 600);
+  const std::string bytes = load(file);
+  const Contents sound = read(file);
+  const auto metadata_after = [&](const std::string& changed) {
+    store(bad, changed);
+    EXPECT_TRUE(recover(bad, out, GetParam()));
+    return read(out).metadata;
+  };
+  const auto chunks = IndexedReader::open(file).value().summary().chunks;
+  ASSERT_GE(chunks.size(), 3u);
+  const std::size_t within = chunks[chunks.size() / 2].offset + 60;
+  std::string holed = bytes;
+  holed[within] = static_cast<char>(holed[within] ^ 1);
+  EXPECT_EQ(metadata_after(holed), sound.metadata + 1);
+  const std::size_t of_cut = metadata_after(bytes.substr(0, within));
+  EXPECT_EQ(of_cut, read(bad).metadata) << "a cut file has no hole";
+}
+
 TEST_P(EveryCompression, AnyBytesAreReadWithoutACrash) {
   const std::string file = path("seed"), bad = path("noise");
   write_file(file, GetParam(), 100);

@@ -11,30 +11,14 @@
 #include "services/perception/service.h"
 #include "services/planner/obstacle_view.h"
 #include "services/planner/service.h"
+#include "tests/support/services.h"
 
 using namespace hamel;
 using runtime::Clock;
+using test::node;
 using namespace std::chrono_literals;
 
 namespace {
-
-scene::Scene load(const std::string& name, std::vector<std::string> overrides = {}) {
-  auto s =
-      files::load_scene(std::string(HAMEL_SOURCE_DIR) + "/deploy/scenes/" + name + ".textproto", overrides);
-  if (!s) {
-    for (const auto& p : s.error()) ADD_FAILURE() << to_string(p);
-    std::abort();
-  }
-  return std::move(s).value();
-}
-
-std::unique_ptr<bus::Node> node(std::uint32_t domain) {
-  bus::NodeOptions o;
-  o.domain = domain;
-  auto n = bus::open(o);
-  EXPECT_TRUE(n);
-  return std::move(n).value();
-}
 
 /// A planner in lockstep that turns the first joint; one bit of one command may be flipped on its way.
 class RelayedPlanner {
@@ -72,7 +56,7 @@ class RelayedPlanner {
 
 wire::RunSummary run_relayed(std::uint64_t flip_at) {
   const auto n = node(1);
-  const scene::Scene s = load("four_link_avoid", {"duration_s=0.2"});
+  const scene::Scene s = test::shipped("four_link_avoid", {"duration_s=0.2"});
   wire::Subscription<wire::RunSummary> summaries(*n);
   RelayedPlanner planner(*n, flip_at);
   auto arm = dynamics::DynamicsService::make(*n, s, {});
@@ -102,7 +86,7 @@ TEST(Lockstep, OneFlippedBitOfOneCommandChangesTheTrajectoryHash) {
 
 TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
   const auto n = node(2);
-  const scene::Scene s = load("four_link_avoid");
+  const scene::Scene s = test::shipped("four_link_avoid");
   auto arm = dynamics::DynamicsService::make(*n, s, {.patience = 50ms});
   ASSERT_TRUE(arm);
   const auto deadline = Clock::now() + 30s;
@@ -115,7 +99,7 @@ TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
 
 TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
   const auto n = node(3);
-  const scene::Scene s = load("four_link_avoid");
+  const scene::Scene s = test::shipped("four_link_avoid");
   wire::Publisher<wire::TorqueCommand> commands(*n);
   auto arm = dynamics::DynamicsService::make(*n, s, {});
   ASSERT_TRUE(arm);
@@ -150,7 +134,7 @@ TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
 /// Runs a scene in lockstep to `until`, all services new, with checkpoints in `folder`.
 wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain) {
   const auto n = node(domain);
-  scene::Scene s = load("four_link_avoid", {"planner.method=gyro"});
+  scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
   s.duration_s = until_s;
   wire::Subscription<wire::RunSummary> summaries(*n);
   auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder});
@@ -260,38 +244,35 @@ TEST(ObstacleView, WaitsForTheSetThatCoversATime) {
 
 TEST(ObstacleView, UsesTheNewestSetThatIsNotFromTheFuture) {
   planner::ObstacleView v;
-  std::vector<geometry::Obstacle> out;
   wire::Causes causes;
-  EXPECT_TRUE(std::isinf(v.at(0, out, causes))) << "nothing ever arrived";
+  EXPECT_TRUE(std::isinf(v.at(0, {}, causes))) << "nothing ever arrived";
   v.add(set(0, 0.1, 1, 1));
   v.add(set(0.1, 0.2, 1, 2));
-  EXPECT_DOUBLE_EQ(v.at(0.05, out, causes), 0.05);
-  EXPECT_EQ(out.size(), 1u);
-  EXPECT_DOUBLE_EQ(v.at(0.15, out, causes), 0.15 - 0.1);
-  EXPECT_EQ(out.size(), 2u);
+  EXPECT_DOUBLE_EQ(v.at(0.05, {}, causes), 0.05);
+  EXPECT_EQ(v.obstacles().size(), 1u);
+  EXPECT_DOUBLE_EQ(v.at(0.15, {}, causes), 0.15 - 0.1);
+  EXPECT_EQ(v.obstacles().size(), 2u);
   v.add(set(0, 0.1, 1, 1));  // late: its successor is in use
-  EXPECT_DOUBLE_EQ(v.at(0.15, out, causes), 0.15 - 0.1);
-  EXPECT_EQ(out.size(), 2u);
+  EXPECT_DOUBLE_EQ(v.at(0.15, {}, causes), 0.15 - 0.1);
+  EXPECT_EQ(v.obstacles().size(), 2u);
 }
 
 TEST(ObstacleView, AnEmptySetIsSomethingElseThanNone) {
   planner::ObstacleView v;
-  std::vector<geometry::Obstacle> out;
   wire::Causes causes;
   v.add(set(0, wire::kInf, 1, 0));
-  EXPECT_EQ(v.at(7, out, causes), 0) << "it promised no successor: it does not age";
+  EXPECT_EQ(v.at(7, {}, causes), 0) << "it promised no successor: it does not age";
   EXPECT_TRUE(v.covers(7));
-  EXPECT_TRUE(out.empty());
+  EXPECT_TRUE(v.obstacles().empty());
 }
 
 TEST(ObstacleView, PutsSourcesTogetherAndIsAsOldAsTheOldest) {
   planner::ObstacleView v;
-  std::vector<geometry::Obstacle> out;
   wire::Causes causes;
   v.add(set(0.5, 1, 2, 3));
   v.add(set(0, 1, 1, 2));
-  EXPECT_DOUBLE_EQ(v.at(0.6, out, causes), 0.6);
-  EXPECT_EQ(out.size(), 5u);
+  EXPECT_DOUBLE_EQ(v.at(0.6, {}, causes), 0.6);
+  EXPECT_EQ(v.obstacles().size(), 5u);
   EXPECT_EQ(causes.size, 2u);
 }
 

@@ -95,7 +95,7 @@ TEST(Goals, AMovingTargetIsFollowed) {
 /// Three links of which the third shall go through the first.
 test::RunResult fold(scene::Method method) {
   scene::Robot robot = test::planar_arm(3, 0.1, 0.05);
-  robot.self_links = {{0, 2}};
+  scene::watch(robot, {{0, 2}});
   scene::PlannerOptions o = planar_options();
   o.method = method;
   scene::Goal goal;

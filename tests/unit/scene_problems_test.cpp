@@ -174,6 +174,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"perception.stream.rate", "> 0", [](Scene& s) { s.perception.stream->rate = -1; }},
         Case{"perception.stream.start_s", "not finite",
              [](Scene& s) { s.perception.stream->start_s = kNan; }},
+        Case{"perception.stream.start_s", "<= the time of the last sample",
+             [](Scene& s) { s.perception.stream->start_s = 1; }},
         Case{"perception.stream.path", "no samples", [](Scene& s) { s.perception.stream->samples.clear(); }},
         Case{"perception.stream.position_m", "not finite",
              [](Scene& s) { s.perception.stream->X_WS.p.x() = kNan; }}));

@@ -117,7 +117,7 @@ class Contraction {
   /// For an equation whose residual is already what the next update leaves.
   void look_no_further() noexcept { least_ = std::numeric_limits<double>::infinity(); }
   /// From now on updates are made by an exact Jacobian: what others left says nothing.
-  void sharpen() noexcept { rate_ = seen_ = 0, known_ = true, least_ = kLeastExact; }
+  void sharpen() noexcept { rate_ = seen_ = 0, known_ = true; }
   /// 0: not known.
   double rate() const noexcept { return rate_; }
   /// The largest in this step; 0: none was seen.
@@ -139,8 +139,9 @@ class Contraction {
 
  private:
   static constexpr double kClear = 100;  ///< a residual so much above rounding is known well
-  /// No update is trusted to leave less, for motion changes from step to step.
-  static constexpr double kLeast = 1e-3, kLeastExact = 1e-6;
+  /// No update is trusted to leave less, for motion changes from step to step; and the momentum handed on is
+  /// that of the last evaluation, which must not be far from the root.
+  static constexpr double kLeast = 1e-3;
   double rounding_, rate_, seen_ = 0, last_ = 0, least_ = kLeast;
   bool known_;
 };

@@ -96,8 +96,8 @@ bool Obstacles::in_reach(const geometry::Obstacle& o, const scene::PlannerOption
   sphere.bound_m = workspace_.radius_m;
   const double distance = geometry::distance_bound(sphere, geometry::solid(o.shape, o.X_WO));
   const double speed = o.velocity_known ? o.V_WO.tail<3>().norm() : kFastest_mps;
-  const double room = std::max(options.rho0_m, kSeen_m) + 2 * std::max(o.sigma_m, 0.0);
-  return !(distance > room + speed * options.stale_brake_s);
+  const double felt = options.rho0_m + 2 * std::max(o.sigma_m, 0.0) + speed * options.stale_brake_s;
+  return !(distance > std::max(felt, kSeen_m));
 }
 
 // Which of a new set matter, in order of their ids.
@@ -155,9 +155,10 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
       J_(Eigen::MatrixXd::Zero(3, n_ * static_cast<Eigen::Index>(kMost))),
       MJ_(Eigen::MatrixXd::Zero(n_, 3)),
       J_other_(Eigen::MatrixXd::Zero(3, n_)) {
-  for (const scene::LinkShape& s : robot.shapes) {
+  for (std::size_t k = 0; k < robot.shapes.size(); ++k) {
+    const scene::LinkShape& s = robot.shapes[k];
     if (s.link < -1 || s.link >= robot.chain.n()) continue;
-    bodies_.push_back({0, s.link, geometry::solid(s.shape, s.X_LS), {}});
+    bodies_.push_back({k, 0, s.link, geometry::solid(s.shape, s.X_LS), {}});
     if (s.link == robot.chain.n() - 1) tip_radius_m_ = geometry::enclosing_capsule(s.shape).radius_m;
   }
   std::stable_sort(bodies_.begin(), bodies_.end(),
@@ -166,8 +167,8 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
     if (b.link >= 0) b.index = shapes_++;
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     for (std::size_t a = 0; a < b; ++a) {
-      const std::pair links{bodies_[a].link, bodies_[b].link};
-      if (std::count(robot.self_links.begin(), robot.self_links.end(), links) > 0) own_.push_back({a, b});
+      const std::pair both{bodies_[a].of_robot, bodies_[b].of_robot};
+      if (std::count(robot.self_pairs.begin(), robot.self_pairs.end(), both) > 0) own_.push_back({a, b});
     }
   links_.resize(bodies_.size());
   for (std::size_t k = 0; k < bodies_.size(); ++k) links_[k].now.shape = bodies_[k].solid_B.shape;
@@ -186,32 +187,20 @@ void Pairs::place(const Arm& arm) noexcept {
     b.solid_W = (b.link < 0 ? arm.chain.X_WB0() : arm.ws.X_WB[static_cast<std::size_t>(b.link)]) * b.solid_B;
 }
 
-void Pairs::find(const Arm& arm, const Obstacles& obstacles) noexcept {
+void Pairs::find(const Arm& arm, const Obstacles& obstacles, std::span<const double> link_floor_m) noexcept {
   clear();
   place(arm);
+  const auto floor_of = [&](const Body& body) {
+    const auto link = static_cast<std::size_t>(body.link);
+    return link < link_floor_m.size() ? link_floor_m[link] : -std::numeric_limits<double>::infinity();
+  };
+  const auto is_far = [&](const Body& body) { return body.link >= 0 && floor_of(body) > options_.rho0_m; };
   for (const Body& body : bodies_) {
-    if (body.link < 0) {
-      touch_base(body, obstacles);
-      continue;
-    }
-    Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
-    for (const Obstacles::Item& item : obstacles.items()) {
-      const double bound = geometry::distance_bound(body.solid_W, item.solid);
-      if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
-      Pair pair;
-      pair.at = geometry::closest(body.solid_W, item.solid);
-      if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
-      pair.d = pair.at.distance_m - item.inflation_m;
-      if (!(pair.d <= options_.rho0_m)) continue;
-      pair.shape = body.index;
-      pair.link = body.link;
-      pair.obstacle = item.now.id;
-      pair.item = &item;
-      pair.n = pair.at.normal;
-      offer(pair);
-    }
-    clearance_m_ = std::min(clearance_m_, nearest.at.distance_m);
+    if (body.link < 0) touch_base(body, obstacles);
+    if (body.link >= 0 && !is_far(body)) measure(body, obstacles);
   }
+  for (const Body& body : bodies_)
+    if (is_far(body) && floor_of(body) < clearance_m_) measure(body, obstacles);
   if (dropped_ > 0)
     std::sort(
         pairs_.begin(), pairs_.begin() + static_cast<std::ptrdiff_t>(count_),
@@ -270,6 +259,26 @@ void Pairs::find_self(const Arm& arm) noexcept {
     }
     pairs_[slot] = pair;
   }
+}
+
+void Pairs::measure(const Body& body, const Obstacles& obstacles) noexcept {
+  Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
+  for (const Obstacles::Item& item : obstacles.items()) {
+    const double bound = geometry::distance_bound(body.solid_W, item.solid);
+    if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
+    Pair pair;
+    pair.at = geometry::closest(body.solid_W, item.solid);
+    if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
+    pair.d = pair.at.distance_m - item.inflation_m;
+    if (!(pair.d <= options_.rho0_m)) continue;
+    pair.shape = body.index;
+    pair.link = body.link;
+    pair.obstacle = item.now.id;
+    pair.item = &item;
+    pair.n = pair.at.normal;
+    offer(pair);
+  }
+  clearance_m_ = std::min(clearance_m_, nearest.at.distance_m);
 }
 
 // When the table is full the farthest pair makes room.

@@ -93,8 +93,9 @@ class Pairs {
   Pairs(const scene::Robot& robot, const scene::PlannerOptions& options);
 
   void clear() noexcept;
-  /// Distances of every link shape to every obstacle; those within rho0 become pairs.
-  void find(const Arm& arm, const Obstacles& obstacles) noexcept;
+  /// Distances of every link shape to every obstacle; those within rho0 become pairs.  Links whose floor is
+  /// above rho0 and above the clearance of the others are passed over (Input::link_floor_m).
+  void find(const Arm& arm, const Obstacles& obstacles, std::span<const double> link_floor_m = {}) noexcept;
   /// The same pairs `ahead_s` later, the arm having gone there too.
   void advance(const Arm& arm, double ahead_s) noexcept;
   /// Velocities, Jacobians and operational inertias of the pairs.
@@ -129,6 +130,7 @@ class Pairs {
 
  private:
   struct Body {
+    std::size_t of_robot = 0;  ///< index of its shape
     int index = 0, link = 0;
     geometry::Solid solid_B, solid_W;
   };
@@ -139,6 +141,7 @@ class Pairs {
   void place(const Arm& arm) noexcept;
   void touch_base(const Body& base, const Obstacles& obstacles) noexcept;
   void find_self(const Arm& arm) noexcept;
+  void measure(const Body& body, const Obstacles& obstacles) noexcept;
   void offer(const Pair& pair) noexcept;
   void complete_self(const Arm& arm, std::size_t k) noexcept;
   void keep_nearest_of_each_link() noexcept;

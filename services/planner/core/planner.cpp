@@ -145,8 +145,11 @@ EscapeQuestion Planner::escape_question(const Input& in) const {
   const double goal_age_s = in.t_s - p.memory.goal_start_s;
   EscapeQuestion question{in.step,           in.q,   in.qd,      {},
                           in.obstacle_age_s, p.goal, goal_age_s, p.memory.waypoint.asked};
-  // As the planner sees them: of unknown velocity goes on with the estimated one.
-  for (const Obstacles::Item& item : p.obstacles.items()) {
+  // As the planner sees them: one of unknown velocity goes on with the estimated one.
+  Obstacles seen(workspace(p.robot));
+  Memory memory = p.memory;
+  seen.take(in.obstacles, in.t_s, in.obstacle_age_s, p.options, memory);
+  for (const Obstacles::Item& item : seen.items()) {
     question.obstacles.push_back(item.now);
     question.obstacles.back().velocity_known = true;
   }
@@ -207,7 +210,7 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
   arm.look(in.q, in.qd);
   remember_tip();
   obstacles.take(in.obstacles, in.t_s, in.obstacle_age_s, options, memory, in.obstacle_set);
-  pairs.find(arm, obstacles);
+  pairs.find(arm, obstacles, in.link_floor_m);
   memory.clearance_min_m = std::min(memory.clearance_min_m, pairs.clearance_m());
   const bool self_contact = pairs.self_clearance_m() < 0;
   const bool contact = pairs.clearance_m() < 0 || self_contact;

@@ -62,6 +62,10 @@ struct Input {
   std::uint64_t obstacle_set = 0;
   double state_age_s = 0;           ///< how old the arm state is
   bool obstacles_expected = false;  ///< the scene has perception: no motion before its first set
+  /// For each link a distance, less inflation, that no obstacle comes under; or empty: nothing is known.  A
+  /// link above rho0 is asked for distances only while its floor is below the clearance of the others; its
+  /// report shows no obstacle then.
+  std::span<const double> link_floor_m = {};
 };
 
 /// The obstacle nearest to one link and the forces it made there; world frame.

@@ -1,0 +1,29 @@
+#include "clients/hamel/chosen.h"
+
+#include "clients/hamel/choose.h"
+#include "common/runtime/log.h"
+#include "common/scene/reduce.h"
+
+namespace hamel::client {
+
+Checked<scene::Scene> load_chosen(runtime::RunOptions& o) {
+  auto scene = runtime::load(o);
+  if (!scene || !scene::wanted(scene.value().reduce, scene.value().reduce.step, false)) return scene;
+  const Choosing c = choose(scene.value(), steady_watch());
+  if (!c.chosen) {
+    spdlog::warn("{}: nothing tried keeps every joint within {:g} over {:g} s; tier and step stay as written",
+                 o.scene_path, scene.value().accuracy.joint_error_rad, c.reference.horizon_s);
+    return scene;
+  }
+  std::string said;
+  for (const std::string& set : overrides(*c.chosen)) {
+    o.overrides.push_back(set);
+    said += " --set " + set;
+  }
+  spdlog::info("{}: chosen for the accuracy:{}", o.scene_path, said);
+  scene = runtime::load(o);
+  if (scene) apply(c, scene.value());
+  return scene;
+}
+
+}  // namespace hamel::client

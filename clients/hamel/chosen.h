@@ -1,0 +1,12 @@
+#pragma once
+/// Scenes for those who may run them: reduced, and with tier and step where the scene leaves these to us.
+
+#include "common/runtime/options.h"
+
+namespace hamel::client {
+
+/// runtime::load(); where the scene's fidelity asks for it, tier and step are then chosen (choose.h), said in
+/// the log, and added to `o.overrides`, so that child processes and recordings take the same ones.
+Checked<scene::Scene> load_chosen(runtime::RunOptions& o);
+
+}  // namespace hamel::client

@@ -1,0 +1,193 @@
+#include "clients/hamel/explain.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "clients/hamel/explain_cost.h"
+#include "common/files/scene_text.h"
+#include "common/rbd/planar_chain.h"
+#include "common/runtime/log.h"
+#include "common/runtime/options.h"
+#include "common/scene/reduce.h"
+
+namespace hamel::client {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* space_of(const scene::Scene& s) {
+  return s.dynamics.space == scene::Space::automatic && rbd::is_planar(s.robot.chain) ? "SE2" : "SE3";
+}
+
+std::string quantity(double v, const std::string& unit) {
+  return unit.empty() ? "" : fmt::format("{:.6g}", v);
+}
+
+const scene::Reduction* find(const scene::Scene& s, const std::string& name) {
+  for (const scene::Reduction& r : s.reductions)
+    if (r.name == name) return &r;
+  return nullptr;
+}
+
+void print_reductions(const Explained& e) {
+  fmt::print("\n  {:<10} {:<8} {:>10} {:>10}  {:<20} {}\n", "", "kind", "before", "after", "",
+             "what, and why");
+  for (const scene::Reduction& r : e.reduced.reductions) {
+    fmt::print("{} {:<10} {:<8} {:>10} {:>10}  {:<20} {}\n", r.in_force ? '*' : ' ', r.name,
+               r.exact ? "exact" : "bounded", quantity(r.before, r.unit), quantity(r.after, r.unit), r.unit,
+               r.what);
+    fmt::print("  {:<64}  {}\n", "", r.why);
+    if (!r.exact && r.in_force) fmt::print("  {:<64}  bound {:.3g} {}\n", "", r.bound, r.bound_unit);
+  }
+  fmt::print("* in force.  Fidelity {}.\n", scene::to_string(e.reduced.reduce.fidelity));
+}
+
+void print_costs(const Explained& e) {
+  const auto row = [&](const std::string& name, const StepCost& c) {
+    fmt::print("  {:<20} {:>12.3f} {:>12.3f} {:>12.3f} {:>8.2f} {:>14.1e}\n", name, c.dynamics_us,
+               c.planner_us, c.total_us(), c.total_us() / e.full_cost.total_us(), c.joint_error);
+  };
+  fmt::print("\n  {:<20} {:>12} {:>12} {:>12} {:>8} {:>14}\n", "cost of a step [us]", "dynamics", "planner",
+             "both", "of full", "joints [rad]");
+  row("full fidelity", e.full_cost);
+  for (const ReductionCost& r : e.each) row("without " + r.name, r.without);
+  row("as reduced", e.reduced_cost);
+  fmt::print(
+      "Ticks alone, no bus; the fastest of five rounds.  Joints: largest distance from those of full "
+      "fidelity.\n");
+}
+
+void print_choice(const Explained& e) {
+  if (!e.choosing) return;
+  const scene::Accuracy& asked = e.written.accuracy;
+  if (!e.choosing->chosen) {
+    fmt::print("\nNo tier and step tried keep every joint within {:g} over {:g} s", asked.joint_error_rad,
+               e.choosing->reference.horizon_s);
+    fmt::print(" (the converged motion is known to {:.1e}).\n", e.choosing->reference.uncertainty);
+    return;
+  }
+  const Setting& c = *e.choosing->chosen;
+  fmt::print("\nChosen of {} tried, to keep every joint within {:g} over {:g} s: {} with dt {:.6g} s\n",
+             e.choosing->tried.size(), asked.joint_error_rad, e.choosing->reference.horizon_s,
+             trade::label(c.dynamics), c.dynamics.dt_s);
+  fmt::print("  measured: joints {:.1e}, energy {:.1e}, {:.4g} x real time\n ", c.joint_error, c.energy_error,
+             1 / c.seconds_per_s);
+  for (const std::string& set : overrides(c)) fmt::print(" --set {}", set);
+  fmt::print("\n");
+}
+
+Json json_of(const StepCost& c) {
+  return {{"dynamics_us", c.dynamics_us}, {"planner_us", c.planner_us}, {"joint_error", c.joint_error}};
+}
+
+Json before_after(double before, double after) { return {{"before", before}, {"after", after}}; }
+
+Json json_of(const Explained& e) {
+  const scene::Scene& s = e.reduced;
+  Json j;
+  j["scene"] = s.name;
+  j["fidelity"] = scene::to_string(s.reduce.fidelity);
+  j["space"] = space_of(s);
+  const scene::Reduction* fixed = find(s, "fixed");
+  const int n = s.robot.chain.n();
+  const double joints = fixed ? fixed->before : n;
+  j["links"] = before_after(joints, n);
+  j["joints"] = before_after(joints, n);
+  const scene::Reduction* obstacles = find(s, "obstacles");
+  j["obstacles"] = obstacles ? before_after(obstacles->before, obstacles->after) : before_after(0, 0);
+  j["tier"] = scene::to_string(s.dynamics.tier);
+  j["dt_s"] = s.dynamics.dt_s;
+  j["bounds"] = Json::array();
+  j["reductions"] = Json::array();
+  for (const scene::Reduction& r : s.reductions) {
+    Json one{{"name", r.name}, {"kind", r.exact ? "exact" : "bounded"}, {"in_force", r.in_force}};
+    one["what"] = r.what;
+    one["why"] = r.why;
+    if (!r.unit.empty()) one["before"] = r.before, one["after"] = r.after, one["unit"] = r.unit;
+    j["reductions"].push_back(one);
+    if (!r.exact && r.in_force)
+      j["bounds"].push_back({{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}});
+  }
+  j["cost_per_step"] = {{"full", json_of(e.full_cost)}, {"reduced", json_of(e.reduced_cost)}};
+  for (const ReductionCost& r : e.each) j["cost_per_step"]["without " + r.name] = json_of(r.without);
+  j["measured_error"] =
+      e.choosing && e.choosing->chosen ? e.choosing->chosen->joint_error : e.reduced_cost.joint_error;
+  return j;
+}
+
+/// A row of the table, e.g. "| three_link_swing | full | midpoint, 0.01 s | 1.2e-3 | ... |".
+std::string row(const scene::Scene& s, const std::string& name, const Setting& m) {
+  return fmt::format("| {} | {} | {} {:.4g} ms | {} | {:.1e} | {:.1e} | {:.3g} | {:.4g} |\n", s.name, name,
+                     trade::label(m.dynamics), 1e3 * m.dynamics.dt_s, space_of(s), m.joint_error,
+                     m.energy_error, 1e6 * m.seconds_per_s, 1 / m.seconds_per_s);
+}
+
+bool print_rows(const scene::Scene& written, const trade::Watch& watch) {
+  const auto as = [&](scene::Fidelity fidelity) {
+    scene::Scene s = written;
+    s.reduce = {.fidelity = fidelity};
+    scene::reduce(s);
+    return s;
+  };
+  scene::Scene full = as(scene::Fidelity::full), exact = as(scene::Fidelity::exact),
+               fastest = as(scene::Fidelity::fastest);
+  const Choosing c = choose(fastest, watch);
+  fmt::print("{}", row(full, "full", measure(full, c.reference, watch)));
+  fmt::print("{}", row(exact, "exact (default)", measure(exact, c.reference, watch)));
+  if (c.chosen)
+    fmt::print("{}",
+               row(fastest, fmt::format("fastest within {:g}", written.accuracy.joint_error_rad), *c.chosen));
+  else
+    fmt::print("| {} | fastest | none keeps to {:g}; reference known to {:.1e} | | | | | |\n", written.name,
+               written.accuracy.joint_error_rad, c.reference.uncertainty);
+  std::fflush(stdout);
+  return c.chosen.has_value();
+}
+
+int print_table(const std::vector<scene::Scene>& scenes, const trade::Watch& watch) {
+  fmt::print(
+      "| scene | fidelity | tier, dt | space | joints off by | energy off by | us a simulated second | "
+      "real-time factor |\n|---|---|---|---|---|---|---|---|\n");
+  bool all = true;
+  for (const scene::Scene& s : scenes) all = print_rows(s, watch) && all;
+  return all ? runtime::kDone : runtime::kFailed;
+}
+
+void print_text(const Explained& e) {
+  const scene::Scene& s = e.reduced;
+  fmt::print(
+      "{}: {} in {}, {} joints, {} dt {:.6g} s{}\n", s.name, s.robot.name, space_of(s), s.robot.chain.n(),
+      trade::label(s.dynamics), s.dynamics.dt_s,
+      s.steered ? fmt::format(", a planner cycle every {} steps", s.planner.period_steps) : ", free motion");
+  print_reductions(e);
+  print_costs(e);
+  print_choice(e);
+}
+
+}  // namespace
+
+int explain(const ExplainArgs& args) {
+  runtime::start_log("hamel", false);
+  if (!std::isfinite(args.seconds))
+    return runtime::complain("hamel explain", {{"--seconds", "must be finite"}});
+  std::vector<scene::Scene> scenes;
+  for (const std::string& path : args.scene_paths) {
+    auto s = files::read_scene(path, args.overrides);
+    if (!s) return runtime::complain("hamel explain", s.error());
+    scenes.push_back(std::move(s).value());
+  }
+  if (args.table) return print_table(scenes, steady_watch());
+  if (scenes.size() != 1)
+    return runtime::complain("hamel explain", {{"SCENE", "one at a time, or several with --table"}});
+  const Explained e = explain_scene(scenes.front(), args.seconds, steady_watch());
+  if (args.json)
+    fmt::print("{}\n", json_of(e).dump(2));
+  else
+    print_text(e);
+  return runtime::kDone;
+}
+
+}  // namespace hamel::client

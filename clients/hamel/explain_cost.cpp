@@ -1,0 +1,107 @@
+#include "clients/hamel/explain_cost.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/hamel/ticks.h"
+#include "common/scene/reduce.h"
+
+namespace hamel::client {
+
+namespace {
+
+constexpr int kRounds = 5;            // of each variant, in turns; the fastest counts
+constexpr std::uint64_t kLeast = 50;  // steps in a round
+
+/// A variant of the scene under the watch.
+struct Variant {
+  scene::Scene scene;
+  StepCost cost{scene::kInf, scene::kInf, 0};
+  std::vector<Eigen::VectorXd> q;  ///< after each step of the first round
+};
+
+/// Runs up to `steps` steps; true while the cost of each round is the least so far kept.
+std::uint64_t round(Variant& v, std::uint64_t steps, const trade::Watch& watch) {
+  Ticks ticks(v.scene);
+  const bool first = v.q.empty();
+  double plan_s = 0, step_s = 0;
+  std::uint64_t k = 0;
+  for (; k < steps && !ticks.done(); ++k) {
+    const double a = watch.now_s();
+    ticks.plan();
+    const double b = watch.now_s();
+    if (!ticks.step()) break;
+    const double c = watch.now_s();
+    plan_s += b - a;
+    step_s += c - b;
+    if (first) v.q.push_back(ticks.arm().state().q);
+  }
+  if (k == 0) return 0;
+  v.cost.planner_us = std::min(v.cost.planner_us, 1e6 * plan_s / static_cast<double>(k));
+  v.cost.dynamics_us = std::min(v.cost.dynamics_us, 1e6 * step_s / static_cast<double>(k));
+  return k;
+}
+
+/// How many steps fill `seconds`.
+std::uint64_t steps_for(const scene::Scene& s, double seconds, const trade::Watch& watch) {
+  Variant probe{s, {}, {}};
+  const double began = watch.now_s();
+  const std::uint64_t k = round(probe, 4 * kLeast, watch);
+  const double each = (watch.now_s() - began) / static_cast<double>(std::max<std::uint64_t>(k, 1));
+  return std::max(kLeast, static_cast<std::uint64_t>(seconds / kRounds / each));
+}
+
+/// Largest distance of two paths whose arms have the same joints.
+double apart(const Variant& a, const Variant& b) {
+  double worst = 0;
+  for (std::size_t k = 0; k < std::min(a.q.size(), b.q.size()); ++k)
+    if (a.q[k].size() == b.q[k].size()) worst = std::max(worst, (a.q[k] - b.q[k]).lpNorm<Eigen::Infinity>());
+  return worst;
+}
+
+scene::Choice* choice(scene::ReduceOptions& o, const std::string& name) {
+  if (name == "locked") return &o.locked;
+  if (name == "plane") return &o.plane;
+  if (name == "gravity") return &o.gravity;
+  if (name == "obstacles") return &o.obstacles;
+  if (name == "links") return &o.links;
+  if (name == "rate") return &o.rate;
+  return nullptr;
+}
+
+Variant reduced(scene::Scene s) {
+  scene::reduce(s);
+  return {std::move(s), {scene::kInf, scene::kInf, 0}, {}};
+}
+
+}  // namespace
+
+Explained explain_scene(const scene::Scene& written, double seconds, const trade::Watch& watch) {
+  scene::Scene full = written;
+  full.reduce = {};
+  full.reduce.fidelity = scene::Fidelity::full;
+  std::vector<Variant> variants{reduced(full), reduced(written)};
+  Explained out{written, variants[0].scene, variants[1].scene, {}, {}, {}, {}};
+  for (const scene::Reduction& r : out.reduced.reductions) {
+    scene::Scene s = written;
+    scene::Choice* const c = choice(s.reduce, r.name);
+    if (!r.in_force || c == nullptr) continue;
+    *c = scene::Choice::off;
+    variants.push_back(reduced(std::move(s)));
+    out.each.push_back({r.name, {}});
+  }
+  const std::uint64_t steps = steps_for(variants[0].scene, seconds, watch);
+  for (int k = 0; k < kRounds; ++k)
+    for (Variant& v : variants) round(v, steps, watch);
+  for (Variant& v : variants) v.cost.joint_error = apart(v, variants[0]);
+  out.full_cost = variants[0].cost;
+  out.reduced_cost = variants[1].cost;
+  for (std::size_t k = 0; k < out.each.size(); ++k) out.each[k].without = variants[k + 2].cost;
+  if (scene::wanted(written.reduce, written.reduce.step, false)) {
+    out.choosing = choose(out.reduced, watch);
+    if (out.choosing->chosen) apply(*out.choosing, out.reduced);
+  }
+  return out;
+}
+
+}  // namespace hamel::client

@@ -1,0 +1,226 @@
+#include "common/scene/reduce.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "common/rbd/planar_chain.h"
+#include "common/scene/locked.h"
+#include "common/scene/reach.h"
+#include "common/scene/rules.h"
+
+namespace hamel::scene {
+namespace {
+
+constexpr double kParallel = 1e-12;     // gravity that is off an axis by less is along it
+constexpr double kLeastStreamHz = 30;   // a stream is resampled at least so often
+constexpr double kSetsInStaleness = 3;  // so many sets come while one of them would still be fresh
+
+std::string count(std::size_t k, const std::string& of) { return of + ": " + std::to_string(k); }
+
+Reduction& note(Scene& s, const std::string& name, bool in_force, const std::string& what,
+                const std::string& why) {
+  Reduction r;
+  r.name = name;
+  r.in_force = in_force;
+  r.what = what;
+  r.why = why;
+  s.reductions.push_back(std::move(r));
+  return s.reductions.back();
+}
+
+void sizes(Reduction& r, double before, double after, const std::string& unit) {
+  r.before = before;
+  r.after = after;
+  r.unit = unit;
+}
+
+void reduce_fixed(Scene& s) {
+  const int n = s.robot.chain.n(), k = s.robot.fixed_joints;
+  sizes(note(s, "fixed", k > 0, count(static_cast<std::size_t>(k), "fixed joints lumped"),
+             k > 0 ? "links behind a fixed joint move as one; always done" : "the robot has none"),
+        n + k, n, "joints");
+}
+
+void reduce_locked(Scene& s) {
+  const auto at = locked_values(s);
+  const auto k = static_cast<std::size_t>(
+      std::count_if(at.begin(), at.end(), [](const auto& v) { return v.has_value(); }));
+  const int n = s.robot.chain.n();
+  const bool on = wanted(s.reduce, s.reduce.locked, true);
+  if (k > 0 && on) freeze(s, at);
+  if (k > 0 && !on) hold(s, at);
+  const std::string why = k == 0 ? "no joint is locked"
+                          : on   ? "their links move as one with what carries them"
+                                 : "kept, and held by a huge rotor inertia";
+  sizes(note(s, "locked", k > 0 && on, count(k, on ? "locked joints frozen" : "locked joints kept"), why), n,
+        s.robot.chain.n(), "joints");
+  s.locked.clear();
+}
+
+void reduce_plane(Scene& s) {
+  const bool planar = rbd::is_planar(s.robot.chain);
+  const bool asked_off = s.dynamics.space == Space::se3 || !wanted(s.reduce, s.reduce.plane, true);
+  const bool on = planar && !asked_off;
+  if (planar && !on) s.dynamics.space = Space::se3;
+  const std::string why = !planar ? "revolute axes are not all parallel, or a slide is not across them"
+                          : on    ? "all revolute axes parallel, all slides across them"
+                                  : "forbidden";
+  sizes(note(s, "plane", on, on ? "SE(2) in place of SE(3)" : "SE(3)", why), 6, on ? 3 : 6,
+        "numbers in a twist");
+}
+
+/// True where the weight is parallel to every axis that turns and across every one that slides, whatever q:
+/// on a planar arm the axes keep their directions.
+bool weight_rests(const model::Chain& chain) {
+  const Eigen::Vector3d g = chain.gravity_W_mps2();
+  lie::Pose X_WB = chain.X_WB0();
+  for (int i = 0; i < chain.n(); ++i) {
+    const model::Joint& joint = chain.joint(i);
+    X_WB = X_WB * joint.X_PJ;
+    const Eigen::Vector3d axis_W = X_WB.R * joint.axis;
+    const bool slides = joint.kind == model::JointKind::prismatic;
+    const double across = slides ? std::abs(axis_W.dot(g)) : axis_W.cross(g).norm();
+    if (across > kParallel * g.norm()) return false;
+  }
+  return rbd::is_planar(chain);
+}
+
+void reduce_gravity(Scene& s) {
+  const Eigen::Vector3d g = s.robot.chain.gravity_W_mps2();
+  const bool none = g.isZero(0), rests = !none && weight_rests(s.robot.chain);
+  const bool on = rests && wanted(s.reduce, s.reduce.gravity, true);
+  if (on) {
+    model::ChainSpec spec = s.robot.chain.spec();
+    spec.gravity_W_mps2.setZero();
+    s.robot.chain = model::build(std::move(spec)).value();
+  }
+  const std::string why = none     ? "the scene has none"
+                          : !rests ? "it works on a joint"
+                          : on     ? "along every axis that turns, across every one that slides"
+                                   : "forbidden";
+  sizes(note(s, "gravity", on,
+             on     ? "gravity dropped"
+             : none ? "no gravity"
+                    : "gravity kept",
+             why),
+        g.norm(), s.robot.chain.gravity_W_mps2().norm(), "m/s^2");
+}
+
+void note_terms(Scene& s) {
+  std::size_t still = 0;
+  for (int i = 0; i < s.robot.chain.n(); ++i) {
+    const model::Joint& joint = s.robot.chain.joint(i);
+    still += joint.damping == 0;
+    still += joint.armature == 0;
+  }
+  const bool none = s.dynamics.stop_stiffness == 0;
+  note(s, "terms", none, none ? "no stop torques evaluated" : "stop torques evaluated",
+       count(still, "zero dampings and rotor inertias stay, a product and a sum each, no branch"));
+}
+
+/// The scene's obstacles that stand still, as perception will publish them.
+std::vector<geometry::Obstacle> standing(const Scene& s) {
+  std::vector<geometry::Obstacle> out;
+  for (const ScriptedObstacle& o : s.perception.obstacles)
+    if (o.velocity_mps.isZero(0) && o.amplitude_m.isZero(0)) out.push_back(o.at_start);
+  return out;
+}
+
+void note_obstacles(Scene& s) {
+  if (!s.steered) return;
+  Reach reach(s.robot, s.planner);
+  const std::vector<geometry::Obstacle> all = standing(s);
+  std::vector<geometry::Obstacle> kept;
+  std::vector<double> floor_m;
+  reach.sift(all, 0, kept, floor_m);
+  const bool moving = s.perception.stream || all.size() < s.perception.obstacles.size();
+  const bool cull = wanted(s.reduce, s.reduce.obstacles, true);
+  const std::string rest = moving ? "; moving ones are looked at in each set" : "";
+  if (!cull) kept = all;
+  sizes(note(s, "obstacles", cull, count(all.size() - kept.size(), "standing obstacles culled") + rest,
+             cull ? "out of reach of every force, and never the nearest to a link; each set is sifted once"
+                  : "forbidden"),
+        static_cast<double>(all.size()), static_cast<double>(kept.size()), "obstacles");
+  const bool skip = wanted(s.reduce, s.reduce.links, false);
+  const auto far = static_cast<std::size_t>(std::count_if(
+      floor_m.begin(), floor_m.end(), [&](double f) { return f > s.planner.rho0_m && std::isfinite(f); }));
+  const int n = s.robot.chain.n();
+  sizes(note(s, "links", skip && far > 0,
+             count(skip ? far : 0, "links not asked for distances while others are nearer"),
+             skip ? "no standing obstacle comes within rho0 of them; their report shows none"
+                  : "fidelity: fastest would; commands stay the same, but their report shows no distance"),
+        n, n - static_cast<int>(skip ? far : 0), "links");
+}
+
+/// The slowest rate at which no scripted obstacle, carried on from its last set, is off by more than asked.
+double rate_needed_hz(const Scene& s) {
+  double rate = kSetsInStaleness / s.planner.stale_slow_s;
+  if (s.perception.stream) rate = std::max(rate, kLeastStreamHz);
+  for (const ScriptedObstacle& o : s.perception.obstacles)
+    rate = std::max(rate, std::sqrt(carried_error_m(o, 1) / s.accuracy.obstacle_error_m));
+  return rate;
+}
+
+void reduce_rate(Scene& s) {
+  if (!s.steered) return;
+  const double before = s.perception.rate_hz, needed = rate_needed_hz(s);
+  const bool less = needed < before, on = less && wanted(s.reduce, s.reduce.rate, false);
+  if (on) s.perception.rate_hz = needed;
+  Reduction& r = note(s, "rate", on, on ? "obstacle sets published less often" : "obstacle sets as written",
+                      !less ? "the obstacles' motion, or their staleness, needs " + number(needed) + " Hz"
+                      : on  ? "carried on with their velocities they stay within the bound"
+                            : "fidelity: fastest would");
+  r.exact = false;
+  sizes(r, before, s.perception.rate_hz, "Hz");
+  for (const ScriptedObstacle& o : s.perception.obstacles)
+    r.bound = std::max(r.bound, on ? carried_error_m(o, 1 / s.perception.rate_hz) : 0);
+  r.bound_unit = std::string("m");
+}
+
+void note_step(Scene& s) {
+  const bool on = wanted(s.reduce, s.reduce.step, false);
+  Reduction& r = note(s, "step", false, "tier and step as written",
+                      on ? "chosen by hamel run, up, batch or explain, and not yet"
+                         : "fidelity: fastest would choose them for the accuracy");
+  r.exact = false;
+  sizes(r, s.dynamics.dt_s, s.dynamics.dt_s, "s");
+  r.bound_unit = std::string("rad");
+}
+
+}  // namespace
+
+bool wanted(const ReduceOptions& o, Choice choice, bool exact) noexcept {
+  if (choice != Choice::automatic) return choice == Choice::on;
+  return exact ? o.fidelity != Fidelity::full : o.fidelity == Fidelity::fastest;
+}
+
+double carried_error_m(const ScriptedObstacle& o, double period_s) noexcept {
+  const double turn = 2 * std::numbers::pi * o.frequency_hz;
+  return 0.5 * turn * turn * o.amplitude_m.norm() * period_s * period_s;
+}
+
+void reduce(Scene& s) {
+  if (!s.reductions.empty()) return;
+  reduce_fixed(s);
+  reduce_locked(s);
+  reduce_plane(s);
+  reduce_gravity(s);
+  note_terms(s);
+  note_obstacles(s);
+  reduce_rate(s);
+  note_step(s);
+}
+
+std::string names_in_force(const Scene& s) {
+  std::string out;
+  for (const Reduction& r : s.reductions) {
+    const bool did = r.in_force && (r.before != r.after || r.name == "obstacles" || r.name == "step");
+    if (did) out.append(out.empty() ? "" : ", ").append(r.name);
+  }
+  if (out.empty()) out.append("none");
+  return out;
+}
+
+}  // namespace hamel::scene

@@ -1,0 +1,40 @@
+#pragma once
+/// From a scene as written to the smallest model that answers it.
+///
+/// Exact reductions change no result beyond rounding: positions, commands, reports.  Bounded ones change it
+/// by no more than they say; only Fidelity::fastest, or a Choice of `on`, puts them in force.
+
+#include <string>
+
+#include "common/scene/scene.h"
+
+namespace hamel::scene {
+
+/// Makes the scene smaller and notes in Scene::reductions all that was considered, in force or not.  Pure:
+/// the same scene gives the same model in every process.  `s` must be valid; reducing twice changes nothing
+/// more.
+///
+///   fixed      exact, always: links behind fixed joints are lumped by the reader
+///   locked     exact: locked joints frozen into composite inertias (locked.h)
+///   plane      exact: SE(2) where all revolute axes are parallel and all slides across them
+///   gravity    exact: zero where it works on no joint, that is parallel to every revolute axis and across
+///              every slide of a planar arm; the potential energy loses its constant
+///   terms      exact: stop torques are not evaluated where there are no stops
+///   obstacles  exact: those that never matter (reach.h) are dropped from each set as it arrives
+///   links      exact in all but one thing, so only for `fastest`: links that no obstacle comes near are not
+///              asked for distances and report none
+///   rate       bounded [m]: scripted obstacles are published no faster than carrying them on needs
+///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
+void reduce(Scene& s);
+
+/// True where an option's reduction is to be in force.
+bool wanted(const ReduceOptions& o, Choice choice, bool exact) noexcept;
+
+/// The names of what is in force and did anything, "plane, obstacles"; "none" where nothing did.
+std::string names_in_force(const Scene& s);
+
+/// How far a swinging obstacle carried on with its velocity is off after `period_s`, at most: half its
+/// largest acceleration times period^2 [m].
+double carried_error_m(const ScriptedObstacle& o, double period_s) noexcept;
+
+}  // namespace hamel::scene

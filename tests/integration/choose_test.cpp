@@ -1,0 +1,95 @@
+// Tier and step chosen for an accuracy keep to it at every step, not only where they were measured.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/hamel/choose.h"
+#include "common/scene/reduce.h"
+#include "tests/support/reduce_scene.h"
+#include "tests/support/soak.h"
+
+namespace hamel::client {
+namespace {
+
+using Eigen::VectorXd;
+
+/// A free motion of 1 to 4 joints and the accuracy asked of it.
+scene::Scene swing(test::Random& rng) {
+  const int n = 1 + static_cast<int>(rng.uniform(0, 4));
+  const test::RandomChain how{.prismatic = 0.2, .armature = 0.3, .damping = 0.3, .mass_spread = 0.3};
+  model::ChainSpec spec =
+      rng.coin(0.5) ? test::random_planar_spec(rng, n, how) : test::random_spec(rng, n, how);
+  scene::Scene s{.name = "swing",
+                 .text = "",
+                 .robot = {"random", "", test::checked(std::move(spec)), {}},
+                 .q0 = rng.vector(n, 1),
+                 .qd0 = rng.vector(n, 0.5),
+                 .goal = {},
+                 .steered = false,
+                 .dynamics = {.dt_s = 5e-3},
+                 .planner = {},
+                 .perception = {},
+                 .bus = {},
+                 .duration_s = 0.4};
+  s.reduce.fidelity = scene::Fidelity::fastest;
+  s.accuracy.joint_error_rad = std::pow(10, rng.uniform(-7, -2));
+  scene::reduce(s);
+  return s;
+}
+
+/// Largest distance at any step of the chosen setting from a run by another method, to rounding.
+double error_at_every_step(const scene::Scene& s, const Setting& setting) {
+  dynamics::Options exact = setting.dynamics;
+  exact.tier = scene::Tier::dopri8;
+  exact.tolerance_rel = 1e-13;
+  dynamics::Integrator a(s.robot.chain, setting.dynamics), b(s.robot.chain, exact);
+  dynamics::State x = a.start(s.q0, s.qd0), y = b.start(s.q0, s.qd0);
+  const VectorXd none = VectorXd::Zero(s.q0.size());
+  double worst = 0;
+  const auto steps = std::llround(s.duration_s / setting.dynamics.dt_s);
+  for (long long k = 0; k < steps; ++k) {
+    EXPECT_TRUE(a.step(x, none).usable());
+    EXPECT_TRUE(b.step(y, none).usable());
+    worst = std::max(worst, (x.q - y.q).lpNorm<Eigen::Infinity>());
+  }
+  return worst;
+}
+
+TEST(Choosing, KeepsToItsBoundAtEveryStepAndTheBoundIsNotIdle) {
+  test::Random rng(21);
+  std::vector<double> ratios;
+  int chosen = 0, half_broken = 0;
+  for (int k = 0; k < (test::soak() ? 1000 : 40); ++k) {
+    const scene::Scene s = swing(rng);
+    const Choosing c = choose(s, steady_watch());
+    if (!c.chosen) continue;
+    ++chosen;
+    const double bound = error_bound(*c.chosen, c.reference), error = error_at_every_step(s, *c.chosen);
+    EXPECT_LE(error, bound) << "case " << k;
+    EXPECT_LE(bound, s.accuracy.joint_error_rad);
+    ratios.push_back(bound / std::max(error, 1e-15));
+    half_broken += error > 0.45 * bound;
+  }
+  EXPECT_GT(chosen, test::soak() ? 900 : 34);
+  std::nth_element(ratios.begin(), ratios.begin() + chosen / 2, ratios.end());
+  EXPECT_LT(ratios[static_cast<std::size_t>(chosen / 2)], 10);
+  EXPECT_GT(half_broken, 0) << "a bound of less than half would have been caught";
+}
+
+TEST(Choosing, IsTheSameEachTimeAndCheapest) {
+  test::Random rng(5);
+  for (int k = 0; k < 3; ++k) {
+    const scene::Scene s = swing(rng);
+    const Choosing a = choose(s, steady_watch()), b = choose(s, steady_watch());
+    ASSERT_TRUE(a.chosen && b.chosen);
+    EXPECT_EQ(overrides(*a.chosen), overrides(*b.chosen));
+    for (const Setting& other : a.tried)
+      if (meets(s.accuracy, other, a.reference)) {
+        EXPECT_LE(a.chosen->work_per_s, other.work_per_s);
+      }
+  }
+}
+
+}  // namespace
+}  // namespace hamel::client

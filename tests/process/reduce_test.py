@@ -1,0 +1,133 @@
+#!/usr/bin/env python3
+"""`hamel explain`, `hamel batch` and the reductions of a run, as a user meets them."""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+from programs import BIN, hamel, main, outcome, scene
+
+GRID = """
+scene: "{scene}"
+set: "duration_s=1"
+vary {{ field: "planner.kobs" values: ["1", "4", "8"] }}
+vary {{ field: "perception.obstacles[0].position_m[0]" from: 2.2 to: 2.6 count: 5 }}
+"""
+
+
+class Explain(unittest.TestCase):
+    def test_the_json_names_what_was_left_out(self):
+        code, out, _ = hamel("explain", scene("four_link_avoid"), "--json", "--seconds", "0.02")
+        self.assertEqual(code, 0)
+        j = json.loads(out)
+        self.assertEqual((j["space"], j["tier"], j["dt_s"], j["fidelity"]), ("SE2", "midpoint", 0.001, "exact"))
+        self.assertEqual(j["joints"]["after"], 4)
+        self.assertEqual(j["links"]["after"], 4)
+        self.assertEqual(j["obstacles"], {"before": 1, "after": 1})
+        self.assertEqual(j["bounds"], [])
+        self.assertIn("without plane", j["cost_per_step"])
+        self.assertLess(j["measured_error"], 1e-9)
+        self.assertTrue(all(r["why"] and r["what"] for r in j["reductions"]))
+
+    def test_full_fidelity_leaves_nothing_out(self):
+        _, out, _ = hamel("explain", scene("four_link_avoid"), "--json", "--seconds", "0.02", "--set", "fidelity=full")
+        j = json.loads(out)
+        self.assertEqual(j["space"], "SE3")
+        self.assertEqual([r["name"] for r in j["reductions"] if r["in_force"] and r["name"] not in ("fixed", "terms")], [])
+
+    def test_a_locked_joint_is_gone_and_a_wrong_one_is_refused(self):
+        code, o = outcome("run", scene("four_link_avoid"), "--duration", "0.5", "--set", 'locked[0]={joint: "joint2"}')
+        self.assertEqual(code, 3)
+        self.assertIn("locked", o["reductions"])
+        code, _, err = hamel("run", scene("four_link_avoid"), "--set", 'locked[0]={joint: "nose"}')
+        self.assertEqual(code, 2)
+        self.assertIn("no such joint", err)
+
+
+class Fastest(unittest.TestCase):
+    def test_run_chooses_tier_and_step_and_keeps_to_the_accuracy(self):
+        code, out, _ = hamel("explain", scene("three_link_swing"), "--json", "--seconds", "0.02", "--set", "fidelity=fastest",
+                             "--set", "duration_s=10", "--set", "accuracy.joint_error_rad=1e-5")
+        self.assertEqual(code, 0)
+        j = json.loads(out)
+        self.assertLessEqual(j["measured_error"], 1e-5)
+        self.assertEqual([b["name"] for b in j["bounds"]], ["step"])
+        code, o = outcome("run", scene("three_link_swing"), "--set", "fidelity=fastest", "--set", "duration_s=10",
+                          "--set", "accuracy.joint_error_rad=1e-5")
+        self.assertEqual(code, 0)
+        self.assertIn("step", o["reductions"])
+
+
+class Batch(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.path = pathlib.Path(self.folder.name)
+        (self.path / "grid.textproto").write_text(GRID.format(scene=scene("four_link_avoid")))
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def run_batch(self, name, *more):
+        out = self.path / name
+        code, text, err = hamel("batch", self.path / "grid.textproto", "-o", out, *more)
+        self.assertEqual(code, 0, err)
+        return out.read_bytes(), text
+
+    def test_the_table_does_not_depend_on_the_workers(self):
+        one, text = self.run_batch("one.csv", "-j", "1")
+        three, _ = self.run_batch("three.csv", "-j", "3")
+        self.assertEqual(one, three)
+        self.assertEqual(len(one.splitlines()), 16)
+        self.assertIn("15 variations", text)
+
+    def test_a_variation_is_what_run_gives(self):
+        rows, _ = self.run_batch("one.csv")
+        last = dict(zip(*[line.decode().split(",") for line in (rows.splitlines()[0], rows.splitlines()[-1])]))
+        _, o = outcome("run", scene("four_link_avoid"), "--duration", "1", "--set", "planner.kobs=8",
+                       "--set", "perception.obstacles[0].position_m[0]=2.6")
+        self.assertEqual(last["trajectory_hash"], o["trajectory_hash"])
+
+    def test_killed_it_goes_on_to_the_same_table(self):
+        whole, _ = self.run_batch("whole.csv")
+        out = self.path / "cut.csv"
+        command = [BIN / "hamel", "batch", self.path / "grid.textproto", "-o", out, "-j", "1"]
+        p = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        partial = pathlib.Path(str(out) + ".partial")
+        end = time.monotonic() + 60
+        while time.monotonic() < end and not (partial.exists() and partial.read_bytes().count(b"\n") >= 4):
+            time.sleep(0.001)
+        os.kill(p.pid, signal.SIGKILL)
+        p.wait()
+        if partial.exists():  # else it was done before the kill
+            with open(partial, "ab") as f:
+                f.write(b"9,cut in the mid")
+            code, _, err = hamel("batch", self.path / "grid.textproto", "-o", out)
+            self.assertEqual(code, 0)
+            self.assertIn("going on after", err)
+        self.assertEqual(out.read_bytes(), whole)
+
+    def test_random_variations_and_tables_are_read(self):
+        (self.path / "random.textproto").write_text(
+            f'scene: "{scene("four_link_avoid")}" random: 4 seed: 7 set: "duration_s=0.2"\n'
+            'vary { field: "planner.kobs" from: 1 to: 8 }\nvary { field: "planner.method" values: ["gyro", "khatib"] }\n')
+        code, text, _ = hamel("batch", self.path / "random.textproto")
+        self.assertEqual((code, "4 variations" in text), (0, True))
+        (self.path / "rows.csv").write_text("planner.kobs,q0\n1,[0, 0.1, 0, 0]\n2,[0, 0, 0, 0]\n")
+        code, text, err = hamel("batch", self.path / "rows.csv", "--scene", scene("four_link_avoid"), "--set", "duration_s=0.2")
+        self.assertEqual(code, 0, err)
+        self.assertIn("2 variations", text)
+
+    def test_a_variation_that_is_no_scene_is_named(self):
+        (self.path / "bad.csv").write_text("planner.kobs\n1\n-1\n")
+        code, _, err = hamel("batch", self.path / "bad.csv", "--scene", scene("four_link_avoid"), "--set", "duration_s=0.1")
+        self.assertEqual(code, 2)
+        self.assertIn("variation 1", err)
+
+
+if __name__ == "__main__":
+    main()
