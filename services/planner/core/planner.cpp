@@ -146,7 +146,7 @@ EscapeQuestion Planner::escape_question(const Input& in) const {
   EscapeQuestion question{in.step,           in.q,   in.qd,      {},
                           in.obstacle_age_s, p.goal, goal_age_s, p.memory.waypoint.asked};
   // As the planner sees them: one of unknown velocity goes on with the estimated one.
-  Obstacles seen(workspace(p.robot));
+  Obstacles seen = p.obstacles;
   Memory memory = p.memory;
   seen.take(in.obstacles, in.t_s, in.obstacle_age_s, p.options, memory);
   for (const Obstacles::Item& item : seen.items()) {
