@@ -27,8 +27,12 @@ void add_overrides(CLI::App& app, std::vector<std::string>& overrides, const cha
 void add_run_like(CLI::App& app, client::RunArgs& a) {
   runtime::add_run_options(app, a.run);
   app.add_flag("--json", a.json, "one JSON object on stdout instead of the table");
-  app.add_option("--csv", a.csv_path,
-                 "write every step: t_s, q, qd, tau, end effector, clearance, energy, iterations")
+  app.add_option(
+         "--csv", a.csv_path,
+         "write every step: t_s, q, qd, tau, end effector, clearance, energy, iterations; of a steered arm "
+         "also "
+         "the planner's state, energies, powers and cycle time, and of each link the nearest obstacle, its "
+         "distance, gate, forces and barrier multiplier")
       ->type_name("FILE");
   app.add_option("--record", a.record_path, "keep every message of the run in this file (MCAP)")
       ->type_name("FILE");

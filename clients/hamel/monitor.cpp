@@ -21,7 +21,7 @@ constexpr std::size_t kRowsWaiting = 200;
 constexpr std::size_t kMostOutages = 1000;
 }  // namespace
 
-Result<std::unique_ptr<CsvWriter>, Problem> CsvWriter::open(const std::string& path, int n) {
+Result<std::unique_ptr<CsvWriter>, Problem> CsvWriter::open(const std::string& path, int n, bool steered) {
   std::unique_ptr<CsvWriter> w(new CsvWriter);
   w->path_ = path;
   w->file_ = std::fopen(path.c_str(), "w");
@@ -29,7 +29,17 @@ Result<std::unique_ptr<CsvWriter>, Problem> CsvWriter::open(const std::string& p
   std::string header = "t_s";
   for (const char* name : {"q", "qd", "tau_Nm"})
     for (int i = 0; i < n; ++i) header += fmt::format(",{}{}", name, i + 1);
-  header += ",ee_x_m,ee_y_m,ee_z_m,clearance_m,energy_J,work_J,iterations,residual_Nm\n";
+  header += ",ee_x_m,ee_y_m,ee_z_m,clearance_m,energy_J,work_J,iterations,residual_Nm";
+  if (steered) {
+    header +=
+        ",state,reason,target_error_m,kinetic_J,attraction_J,tank_J,gyroscopic_power_W,injected_power_W,"
+        "self_clearance_m,barrier_rows,cycle_time_s";
+    for (int i = 1; i <= n; ++i)
+      header += fmt::format(
+          ",obstacle{0},distance_m{0},closing_mps{0},gate{0},gyroscopic_N{0},repulsive_N{0},barrier_N{0}", i);
+  }
+  header += "\n";
+  w->links_ = steered ? n : 0;
   std::fputs(header.c_str(), w->file_);
   return w;
 }
@@ -38,15 +48,36 @@ CsvWriter::~CsvWriter() {
   if (file_) std::fclose(file_);
 }
 
-void CsvWriter::row(const wire::ArmState& s, const Eigen::Vector3d& tip_m, double clearance_m) {
+void CsvWriter::row(const wire::ArmState& s, const Eigen::Vector3d& tip_m, const wire::PlannerReport& r) {
   fmt::memory_buffer b;
   const auto out = std::back_inserter(b);
   fmt::format_to(out, "{:.9g}", s.t_s);
   for (const auto* v : {&s.position, &s.velocity, &s.torque_applied})
     for (Eigen::Index i = 0; i < v->size(); ++i) fmt::format_to(out, ",{:.17g}", (*v)[i]);
-  fmt::format_to(out, ",{:.9g},{:.9g},{:.9g},{:.9g},{:.17g},{:.17g},{},{:.3g}\n", tip_m.x(), tip_m.y(),
-                 tip_m.z(), clearance_m, s.energy_J, s.work_J, s.solver.iterations, s.solver.residual_Nm);
+  fmt::format_to(out, ",{:.9g},{:.9g},{:.9g},{:.9g},{:.17g},{:.17g},{},{:.3g}", tip_m.x(), tip_m.y(),
+                 tip_m.z(), r.clearance_m, s.energy_J, s.work_J, s.solver.iterations, s.solver.residual_Nm);
+  if (links_ > 0) report(r, out);
+  b.push_back('\n');
   failed_ |= std::fwrite(b.data(), 1, b.size(), file_) != b.size();
+}
+
+/// What the planner thought.
+void CsvWriter::report(const wire::PlannerReport& r,
+                       std::back_insert_iterator<fmt::memory_buffer> out) const {
+  fmt::format_to(out, ",{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{:.9g},{},{:.3g}",
+                 wire::to_string(r.state), wire::to_string(r.reason), r.target_error_m, r.kinetic_J,
+                 r.attraction_J, r.tank_J, r.gyroscopic_power_W, r.injected_power_W, r.self_clearance_m,
+                 r.barrier_rows, r.cycle_time_s);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(links_); ++i) {
+    if (i >= r.links.size() || !std::isfinite(r.links[i].distance_m)) {
+      fmt::format_to(out, ",,inf,0,0,0,0,0");  // nothing near
+      continue;
+    }
+    const wire::LinkReport& l = r.links[i];
+    fmt::format_to(out, ",{},{:.9g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}", l.obstacle, l.distance_m,
+                   l.closing_speed_mps, l.gate, l.gyroscopic_N.norm(), l.repulsive_N.norm(),
+                   l.barrier_multiplier);
+  }
 }
 
 std::optional<Problem> CsvWriter::finish() {
@@ -170,7 +201,7 @@ void Monitor::write_rows(bool all) {
         all || !scene_.steered || (report_ && report_->step >= s.step) || rows_.size() > kRowsWaiting;
     if (!ready) return;
     rbd::positions(scene_.robot.chain, s.position, ws_);
-    csv_->row(s, rbd::tip(scene_.robot.chain, ws_).p, report_ ? report_->clearance_m : wire::kInf);
+    csv_->row(s, rbd::tip(scene_.robot.chain, ws_).p, report_ ? *report_ : wire::PlannerReport{});
     rows_.pop_front();
   }
 }

@@ -1,8 +1,11 @@
 #pragma once
 /// Watches a run on the wire and tells how it went: a live line, a row per step, an outcome at the end.
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <deque>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,20 +40,22 @@ struct Outcome {
 
 class CsvWriter {
  public:
-  /// Fails with the reason where the file cannot be written.
-  static Result<std::unique_ptr<CsvWriter>, Problem> open(const std::string& path, int n);
+  /// Fails with the reason where the file cannot be written.  `steered`: with the planner's columns.
+  static Result<std::unique_ptr<CsvWriter>, Problem> open(const std::string& path, int n, bool steered);
   ~CsvWriter();
   CsvWriter(const CsvWriter&) = delete;
   CsvWriter& operator=(const CsvWriter&) = delete;
-  void row(const wire::ArmState& s, const Eigen::Vector3d& tip_m, double clearance_m);
+  void row(const wire::ArmState& s, const Eigen::Vector3d& tip_m, const wire::PlannerReport& r);
   /// Flushes; the problem where anything could not be written (a full disk).
   std::optional<Problem> finish();
 
  private:
   CsvWriter() = default;
+  void report(const wire::PlannerReport& r, std::back_insert_iterator<fmt::memory_buffer> out) const;
   std::FILE* file_ = nullptr;
   std::string path_;
   bool failed_ = false;
+  int links_ = 0;  ///< with columns of their own
 };
 
 class Monitor final : public runtime::Service {

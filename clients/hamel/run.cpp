@@ -41,7 +41,7 @@ int run(const RunArgs& asked) {
 
   std::unique_ptr<CsvWriter> csv;
   if (!args.csv_path.empty()) {
-    auto w = CsvWriter::open(args.csv_path, s.robot.chain.n());
+    auto w = CsvWriter::open(args.csv_path, s.robot.chain.n(), s.steered);
     if (!w) return runtime::complain("hamel run", {w.error()});
     csv = std::move(w).value();
   }

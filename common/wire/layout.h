@@ -140,6 +140,7 @@ void layout(A& a, M& m) {
   a.reals("links.point_on_obstacle_m", m.point_on_obstacle_m);
   a.real("links.closing_speed_mps", m.closing_speed_mps);
   a.real("links.phi_rad", m.phi_rad);
+  a.real("links.gate", m.gate);
   a.reals("links.gyroscopic_N", m.gyroscopic_N);
   a.reals("links.repulsive_N", m.repulsive_N);
   a.real("links.barrier_multiplier", m.barrier_multiplier);
@@ -167,10 +168,20 @@ void layout(A& a, M& m) {
   a.real("time_to_goal_s", m.time_to_goal_s);
   a.real("gyroscopic_power_W", m.gyroscopic_power_W);
   a.real("injected_power_W", m.injected_power_W);
+  a.real("kinetic_J", m.kinetic_J);
+  a.real("attraction_J", m.attraction_J);
+  a.real("tank_J", m.tank_J);
+  a.real("self_clearance_m", m.self_clearance_m, cdr::Real::or_plus_inf);
+  a.integer("pairs_in_range", m.pairs_in_range);
+  a.integer("pairs_dropped", m.pairs_dropped);
+  a.integer("barrier_rows", m.barrier_rows);
+  a.integer("velocities_estimated", m.velocities_estimated);
+  a.integer("velocities_unknown", m.velocities_unknown);
+  a.integer("escapes", m.escapes);
   a.real("obstacle_age_s", m.obstacle_age_s, cdr::Real::or_plus_inf);
   a.real("cycle_time_s", m.cycle_time_s);
   a.integer("commands_late", m.commands_late);
-  a.list("links", m.links, kMaxLinks, 136, [](A& ar, auto& l) { layout(ar, l); });
+  a.list("links", m.links, kMaxLinks, 144, [](A& ar, auto& l) { layout(ar, l); });
   causes(a, m.caused_by);
 }
 

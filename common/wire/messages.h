@@ -122,7 +122,7 @@ struct LinkReport {
   std::uint32_t link = 0, obstacle = 0;
   double distance_m = kInf;
   Eigen::Vector3d point_on_link_m = Eigen::Vector3d::Zero(), point_on_obstacle_m = Eigen::Vector3d::Zero();
-  double closing_speed_mps = 0, phi_rad = 0;
+  double closing_speed_mps = 0, phi_rad = 0, gate = 0;
   Eigen::Vector3d gyroscopic_N = Eigen::Vector3d::Zero(), repulsive_N = Eigen::Vector3d::Zero();
   double barrier_multiplier = 0;
 };
@@ -141,6 +141,10 @@ struct PlannerReport {
   std::uint32_t contacts = 0;
   double path_length_m = 0, time_to_goal_s = -1;
   double gyroscopic_power_W = 0, injected_power_W = 0;
+  double kinetic_J = 0, attraction_J = 0, tank_J = 0;
+  double self_clearance_m = kInf;
+  std::uint32_t pairs_in_range = 0, pairs_dropped = 0, barrier_rows = 0;
+  std::uint32_t velocities_estimated = 0, velocities_unknown = 0, escapes = 0;
   double obstacle_age_s = 0, cycle_time_s = 0;
   std::uint64_t commands_late = 0;
   std::vector<LinkReport> links;

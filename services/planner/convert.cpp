@@ -41,6 +41,16 @@ void to_wire(const Report& r, wire::PlannerReport& out) {
   out.time_to_goal_s = r.time_to_goal_s;
   out.gyroscopic_power_W = r.gyroscopic_power_W;
   out.injected_power_W = r.injected_power_W;
+  out.kinetic_J = r.kinetic_J;
+  out.attraction_J = r.attraction_J;
+  out.tank_J = r.tank_J;
+  out.self_clearance_m = r.self_clearance_m;
+  out.pairs_in_range = static_cast<std::uint32_t>(r.pairs_in_range);
+  out.pairs_dropped = static_cast<std::uint32_t>(r.pairs_dropped);
+  out.barrier_rows = static_cast<std::uint32_t>(r.barrier_rows);
+  out.velocities_estimated = static_cast<std::uint32_t>(r.velocities_estimated);
+  out.velocities_unknown = static_cast<std::uint32_t>(r.velocities_unknown);
+  out.escapes = static_cast<std::uint32_t>(r.escapes);
   out.links.resize(r.links.size());
   for (std::size_t i = 0; i < r.links.size(); ++i) {
     const LinkReport& a = r.links[i];
@@ -52,6 +62,7 @@ void to_wire(const Report& r, wire::PlannerReport& out) {
     b.point_on_obstacle_m = a.point_on_obstacle_m;
     b.closing_speed_mps = a.closing_speed_mps;
     b.phi_rad = a.phi_rad;
+    b.gate = a.gate;
     b.gyroscopic_N = a.gyroscopic_N;
     b.repulsive_N = a.repulsive_N;
     b.barrier_multiplier = a.barrier_multiplier;

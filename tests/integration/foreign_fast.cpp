@@ -64,11 +64,14 @@ void golden(PlannerReport& m) {
   m.speed_mps(8.5), m.end_effector_m({9.1, 9.2, 9.3}), m.clearance_m(10.5), m.clearance_min_m(11.5),
       m.contacts(12);
   m.path_length_m(13.5), m.time_to_goal_s(14.5), m.gyroscopic_power_W(15.5), m.injected_power_W(16.5);
+  m.kinetic_J(20.5), m.attraction_J(21.5), m.tank_J(22.5), m.self_clearance_m(kInf);
+  m.pairs_in_range(23), m.pairs_dropped(24), m.barrier_rows(25), m.velocities_estimated(26);
+  m.velocities_unknown(27), m.escapes(28);
   m.obstacle_age_s(17.5), m.cycle_time_s(18.5), m.commands_late(19);
   m.links().resize(1);
   LinkReport& l = m.links()[0];
   l.link(1), l.obstacle_id(2), l.distance_m(kInf), l.point_on_link_m({4.1, 4.2, 4.3});
-  l.point_on_obstacle_m({5.1, 5.2, 5.3}), l.closing_speed_mps(6.5), l.phi_rad(7.5);
+  l.point_on_obstacle_m({5.1, 5.2, 5.3}), l.closing_speed_mps(6.5), l.phi_rad(7.5), l.gate(0.5);
   l.gyroscopic_N({8.1, 8.2, 8.3}), l.repulsive_N({9.1, 9.2, 9.3}), l.barrier_multiplier(10.5);
   m.caused_by(causes());
 }

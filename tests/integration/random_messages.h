@@ -103,12 +103,16 @@ inline void randomise(Random& r, wire::PlannerReport& m) {
   m.clearance_m = r.real_or_inf(), m.clearance_min_m = r.real_or_inf(), m.contacts = r.u32();
   m.path_length_m = r.real(), m.time_to_goal_s = r.real();
   m.gyroscopic_power_W = r.real(), m.injected_power_W = r.real();
+  m.kinetic_J = r.real(), m.attraction_J = r.real(), m.tank_J = r.real();
+  m.self_clearance_m = r.real_or_inf(), m.pairs_in_range = r.u32(), m.pairs_dropped = r.u32();
+  m.barrier_rows = r.u32(), m.velocities_estimated = r.u32(), m.velocities_unknown = r.u32();
+  m.escapes = r.u32();
   m.obstacle_age_s = r.real_or_inf(), m.cycle_time_s = r.real(), m.commands_late = r.u64();
   m.links.resize(r.below(65));
   for (wire::LinkReport& l : m.links) {
     l.link = r.u32(), l.obstacle = r.u32(), l.distance_m = r.real_or_inf();
     r.fill(l.point_on_link_m), r.fill(l.point_on_obstacle_m), r.fill(l.gyroscopic_N), r.fill(l.repulsive_N);
-    l.closing_speed_mps = r.real(), l.phi_rad = r.real(), l.barrier_multiplier = r.real();
+    l.closing_speed_mps = r.real(), l.phi_rad = r.real(), l.gate = r.real(), l.barrier_multiplier = r.real();
   }
   m.caused_by = r.causes();
 }

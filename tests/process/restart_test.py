@@ -264,7 +264,7 @@ class Alone(unittest.TestCase):
         self.assertEqual(o["outcome"], "REACHED", err)
 
     def test_a_second_planner_is_refused_and_named_and_a_stronger_one_takes_over(self):
-        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 14,
+        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 20,
                 "--domain", 79) as up:
             up.child("dynamics")
             for strength in ("0", "5"):

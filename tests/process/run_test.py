@@ -40,6 +40,29 @@ class Swing(unittest.TestCase):
             self.assertAlmostEqual(float(last[name]), reference, delta=2e-3)
 
 
+class Diagnostics(unittest.TestCase):
+    def test_the_table_tells_what_the_planner_thought(self):
+        with tempfile.NamedTemporaryFile(suffix=".csv") as f:
+            code, o = outcome("run", scene("four_link_avoid"), "--set", "planner.method=gyro", "--csv", f.name)
+            self.assertEqual(code, 0)
+            with open(f.name, newline="") as rows:
+                table = list(csv.DictReader(rows))
+        self.assertEqual(table[-1]["state"], "REACHED")
+        self.assertIn("MOVING", {r["state"] for r in table})
+        links = range(1, 5)
+        near = [r for r in table if any(float(r[f"gate{i}"]) > 0 for i in links)]
+        self.assertTrue(near)
+        for r in table[1:]:
+            clearance = min(float(r[f"distance_m{i}"]) for i in links)
+            self.assertAlmostEqual(clearance, float(r["clearance_m"]), delta=1e-8)
+            self.assertLess(abs(float(r["gyroscopic_power_W"])), 1e-9 * (1 + float(r["kinetic_J"])))
+            for i in links:  # a force only where the gate is open
+                self.assertTrue(float(r[f"gyroscopic_N{i}"]) == 0 or float(r[f"gate{i}"]) > 0)
+        self.assertAlmostEqual(min(float(r["clearance_m"]) for r in table), o["min_clearance_m"], delta=1e-6)
+        self.assertTrue(any(float(r["barrier_N4"]) > 0 for r in table))
+        self.assertTrue(all(float(r["cycle_time_s"]) >= 0 for r in table))
+
+
 class FourLink(unittest.TestCase):
     """Example 5.2, set s1."""
 

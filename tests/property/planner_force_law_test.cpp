@@ -103,6 +103,32 @@ TEST(ForceLaw, HasNoNaNWhereTheAngleIsDegenerate) {
   }
 }
 
+// What the reports call the gate is the part of the gain that distance and heading let through.
+TEST(ForceLaw, GateIsTheGainOverWhatTheGainWouldBeWideOpen) {
+  scene::PlannerOptions o;
+  test::Random rng(3);
+  for (int k = 0; k < 10000; ++k) {
+    const Vector3d n = rng.unit(), v = rng.uniform(0.01, 2) * rng.unit();
+    const double d = rng.uniform(0.001, 1.5 * o.rho0_m), closing = n.dot(v);
+    for (const GainForm form : {GainForm::F1, GainForm::F2, GainForm::F3, GainForm::S}) {
+      const double g = gyro_gate(o, form, n, d, v), phi = approach_angle(n, v);
+      ASSERT_TRUE(g >= 0 && g <= 1);
+      ASSERT_EQ(g == 0, d > o.rho0_m || closing <= 0) << d << " " << closing;
+      const double open = form == GainForm::S    ? closing
+                          : form == GainForm::F1 ? std::exp(phi) - 1
+                          : form == GainForm::F2 ? std::exp(1 / std::max(phi, o.phi_min_rad))
+                                                 : std::exp(phi - 1);
+      ASSERT_NEAR(gyro_gain(o, form, n, d, v), g * o.kobs * open / d, 1e-12 * o.kobs * std::abs(open) / d);
+    }
+    o.method = scene::Method::attract;
+    ASSERT_EQ(gate(o, n, d, v), 0);
+    o.method = scene::Method::khatib;
+    ASSERT_EQ(gate(o, n, d, v) * khatib_force(o, n, d), khatib_force(o, n, d));
+    o.method = scene::Method::gyro;
+    ASSERT_EQ(gate(o, n, d, v), gyro_gate(o, GainForm::S, n, d, v));
+  }
+}
+
 // Straight at the centre the paper's axis is not defined and the particle flies into the wall; a preferred
 // axis turns it to that side, always.
 TEST(ForceLaw, PreferredAxisDecidesHeadOn) {

@@ -125,12 +125,14 @@ bool finite(const planner::Report& r) {
   bool ok = std::isfinite(r.target_error_m) && std::isfinite(r.orientation_error_rad) &&
             std::isfinite(r.speed_mps) && r.end_effector_m.allFinite() && !std::isnan(r.clearance_m) &&
             !std::isnan(r.clearance_min_m) && std::isfinite(r.path_length_m) &&
-            std::isfinite(r.gyroscopic_power_W) && std::isfinite(r.injected_power_W);
+            std::isfinite(r.gyroscopic_power_W) && std::isfinite(r.injected_power_W) &&
+            std::isfinite(r.kinetic_J) && std::isfinite(r.attraction_J) && std::isfinite(r.tank_J) &&
+            !std::isnan(r.self_clearance_m);
   for (const auto& l : r.links)
     ok = ok && !std::isnan(l.distance_m) && l.point_on_link_m.allFinite() &&
          l.point_on_obstacle_m.allFinite() && std::isfinite(l.closing_speed_mps) &&
-         std::isfinite(l.phi_rad) && l.gyroscopic_N.allFinite() && l.repulsive_N.allFinite() &&
-         std::isfinite(l.barrier_multiplier);
+         std::isfinite(l.phi_rad) && l.gate >= 0 && l.gate <= 1 && l.gyroscopic_N.allFinite() &&
+         l.repulsive_N.allFinite() && std::isfinite(l.barrier_multiplier);
   return ok;
 }
 

@@ -24,19 +24,39 @@ Vector3d khatib_force(const scene::PlannerOptions& o, const Vector3d& n, double 
   return -n * o.eta * std::max(1 / near - 1 / o.rho0_m, 0.0) / (near * near);
 }
 
-double gyro_gain(const scene::PlannerOptions& o, GainForm form, const Vector3d& n, double d,
+double gyro_gate(const scene::PlannerOptions& o, GainForm form, const Vector3d& n, double d,
                  const Vector3d& v) noexcept {
   const double closing = n.dot(v), speed = v.norm();
   if (d > o.rho0_m || closing <= 0 || speed < kSlowest_mps) return 0;
-  const double near = std::max(d, kNearest_m);
-  if (form == GainForm::S) {
-    return o.kobs * closing / near * smooth_step(1 - d / o.rho0_m) * smooth_step(closing / speed / o.c0);
+  if (form == GainForm::S) return smooth_step(1 - d / o.rho0_m) * smooth_step(closing / speed / o.c0);
+  return 1 / (1 + std::exp(d - o.rho0_m));
+}
+
+double gate(const scene::PlannerOptions& o, const Vector3d& n, double d, const Vector3d& v) noexcept {
+  switch (o.method) {
+    case scene::Method::attract:
+      return 0;
+    case scene::Method::khatib:
+      return d > o.rho0_m ? 0 : 1;
+    case scene::Method::gyro_paper:
+      return gyro_gate(o, o.gain_form, n, d, v);
+    case scene::Method::gyro:
+      return gyro_gate(o, GainForm::S, n, d, v);
   }
+  return 0;
+}
+
+double gyro_gain(const scene::PlannerOptions& o, GainForm form, const Vector3d& n, double d,
+                 const Vector3d& v) noexcept {
+  const double open = gyro_gate(o, form, n, d, v);
+  if (open == 0) return 0;
+  const double near = std::max(d, kNearest_m);
+  if (form == GainForm::S) return o.kobs * n.dot(v) / near * open;
   const double phi = approach_angle(n, v);
   const double G = form == GainForm::F1   ? std::expm1(phi)
                    : form == GainForm::F2 ? std::exp(1 / std::max(phi, o.phi_min_rad))
                                           : std::exp(phi - 1);
-  return o.kobs * G / near / (1 + std::exp(d - o.rho0_m));
+  return o.kobs * G / near * open;
 }
 
 Vector3d paper_rotation(const scene::PlannerOptions& o, const Vector3d& n, double d,

@@ -23,6 +23,15 @@ double approach_angle(const Eigen::Vector3d& n, const Eigen::Vector3d& v) noexce
 /// -n eta (1/d - 1/rho0)/d^2 inside rho0, else 0.  Eq. (18).
 Eigen::Vector3d khatib_force(const scene::PlannerOptions& o, const Eigen::Vector3d& n, double d) noexcept;
 
+/// How much of a gain's strength is let through, 0..1: 0 beyond rho0, when receding and at rest.
+///   F1, F2, F3: 1/(1 + exp(d - rho0)), Eq. (20)
+///   S:          S(1 - d/rho0) S(c/c0), c = n.v/|v|; planner.md 1.4
+double gyro_gate(const scene::PlannerOptions& o, scene::GainForm form, const Eigen::Vector3d& n, double d,
+                 const Eigen::Vector3d& v) noexcept;
+/// The same of the method in use: 0 for attract, 1 within rho0 for khatib.
+double gate(const scene::PlannerOptions& o, const Eigen::Vector3d& n, double d,
+            const Eigen::Vector3d& v) noexcept;
+
 /// The scalar k of w = k e; 0 beyond rho0, when receding and at rest.
 ///   F1, F2, F3: kobs G(phi) / d / (1 + exp(d - rho0)), Eq. (20); G = exp(phi)-1, exp(1/max(phi, phi_min)),
 ///   exp(phi-1) S:          kobs (n.v) / d S(1 - d/rho0) S(c/c0), c = n.v/|v|; planner.md 1.4

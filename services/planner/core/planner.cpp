@@ -463,6 +463,7 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.orientation_error_rad = has_goal ? goal_error.angle_rad : 0;
   out.clearance_m = pairs.clearance_m();
   out.clearance_min_m = memory.clearance_min_m;
+  out.self_clearance_m = pairs.self_clearance_m();
   out.contacts = memory.contacts;
   out.path_length_m = memory.path_length_m;
   out.time_to_goal_s = memory.time_to_goal_s;
@@ -480,7 +481,7 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.escapes = memory.waypoint.asked;
   out.barrier_rows = outcome.rows;
   out.barrier_steps = outcome.steps;
-  report_links(pairs, out);
+  report_links(pairs, options, out);
 }
 
 }  // namespace hamel::planner

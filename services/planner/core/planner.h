@@ -75,6 +75,7 @@ struct LinkReport {
   Eigen::Vector3d point_on_link_m = Eigen::Vector3d::Zero(), point_on_obstacle_m = Eigen::Vector3d::Zero();
   double closing_speed_mps = 0;  ///< > 0: approaching
   double phi_rad = 0;            ///< angle between motion and obstacle
+  double gate = 0;               ///< see gate()
   Eigen::Vector3d gyroscopic_N = Eigen::Vector3d::Zero(), repulsive_N = Eigen::Vector3d::Zero();
   double barrier_multiplier = 0;  ///< [N] push of the barrier along -n
 };
@@ -88,11 +89,12 @@ struct Report {
   double orientation_error_rad = 0;
   double speed_mps = 0;  ///< of the end effector
   Eigen::Vector3d end_effector_m = Eigen::Vector3d::Zero();
-  double clearance_m = std::numeric_limits<double>::infinity();      ///< smallest distance now
-  double clearance_min_m = std::numeric_limits<double>::infinity();  ///< smallest so far
-  std::uint64_t contacts = 0;                                        ///< cycles with clearance < 0 so far
-  double path_length_m = 0;                                          ///< of the end effector so far
-  double time_to_goal_s = -1;                                        ///< < 0: not reached yet
+  double clearance_m = std::numeric_limits<double>::infinity();       ///< smallest distance now
+  double clearance_min_m = std::numeric_limits<double>::infinity();   ///< smallest so far
+  double self_clearance_m = std::numeric_limits<double>::infinity();  ///< of two links that must not touch
+  std::uint64_t contacts = 0;                                         ///< cycles with clearance < 0 so far
+  double path_length_m = 0;                                           ///< of the end effector so far
+  double time_to_goal_s = -1;                                         ///< < 0: not reached yet
   double gyroscopic_power_W = 0;            ///< 0 but for rounding where the mapping is powerless
   double injected_power_W = 0;              ///< by moving obstacles and circulation
   double kinetic_J = 0, attraction_J = 0;   ///< of the arm; of the pull, kp/2 e^T Lam e

@@ -6,7 +6,7 @@
 
 namespace hamel::planner {
 
-void report_links(const Pairs& pairs, Report& out) noexcept {
+void report_links(const Pairs& pairs, const scene::PlannerOptions& options, Report& out) noexcept {
   out.links.resize(pairs.nearest().size());
   for (std::size_t i = 0; i < out.links.size(); ++i) {
     LinkReport& link = out.links[i];
@@ -25,6 +25,7 @@ void report_links(const Pairs& pairs, Report& out) noexcept {
     if (pair.item != nearest.item || pair.shape != nearest.shape) continue;
     link.closing_speed_mps = pair.n.dot(pair.v_relative);
     link.phi_rad = approach_angle(pair.n, pair.v_relative);
+    link.gate = gate(options, pair.n, pair.d, pair.v_relative);
     link.gyroscopic_N = pair.gyroscopic;
     link.repulsive_N = pair.repulsive;
     link.barrier_multiplier = pair.multiplier;

@@ -7,6 +7,6 @@
 namespace hamel::planner {
 
 /// Each link's nearest obstacle and the forces between the two.  No allocation where out.links has n entries.
-void report_links(const Pairs& pairs, Report& out) noexcept;
+void report_links(const Pairs& pairs, const scene::PlannerOptions& options, Report& out) noexcept;
 
 }  // namespace hamel::planner
