@@ -173,7 +173,7 @@ TEST(Restart, InLockstepContinuesBitForBit) {
 wire::TorqueCommand answer(const std::string& folder, std::uint64_t first, std::uint64_t last,
                            std::uint32_t domain) {
   const auto n = node(domain);
-  const scene::Scene s = load("four_link_avoid", {"planner.method=gyro"});
+  const scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
   wire::Publisher<wire::ArmState> states(*n);
   wire::Publisher<wire::ObstacleSet> sets(*n);
   wire::Subscription<wire::TorqueCommand> commands(*n);
