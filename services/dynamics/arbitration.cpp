@@ -43,6 +43,8 @@ void DynamicsService::take_commands() {
       ++commands_refused_;
       continue;
     }
+    // What was never driven is at rest where the run begins: it starts at once, as in lockstep.
+    if (!command_step_) driven_from_ = step_now() - ramp_steps();
     command_ = incoming_.torque;
     command_step_ = incoming_.step;
     command_includes_gravity_ = incoming_.includes_gravity;

@@ -1,13 +1,16 @@
 /// What a restart of the dynamics service resumes from, and how.
 
+#include <limits>
+
 #include "services/dynamics/service.h"
 
 namespace hamel::dynamics {
 
 namespace {
 
-constexpr std::uint32_t kKind = 0x0103;  // dynamics, layout 3
+constexpr std::uint32_t kKind = 0x0104;  // dynamics, layout 4
 constexpr std::uint64_t kNone = ~std::uint64_t{0};
+constexpr std::int64_t kNotDriven = std::numeric_limits<std::int64_t>::min();
 
 std::size_t length(const Eigen::VectorXd& v) { return static_cast<std::size_t>(v.size()); }
 
@@ -20,7 +23,8 @@ struct Saved {
   std::int32_t mode = -1;
   std::uint64_t mode_id = 0;
   Eigen::VectorXd held, applied, command;
-  std::uint64_t command_step = kNone, driven_from = kNone, epoch = 0;
+  std::uint64_t command_step = kNone, epoch = 0;
+  std::int64_t driven_from = kNotDriven;
   bus::WriterId owner{};
   std::uint32_t planner_state = 0, validity = 0, gravity = 0;
   wire::Causes causes;
@@ -68,7 +72,7 @@ void DynamicsService::save() {
   p.put(arm_.torque_applied().data(), length(arm_.torque_applied()));
   p.put(command_.data(), length(command_));
   p.put(command_step_.value_or(kNone));
-  p.put(driven_from_.value_or(kNone));
+  p.put(driven_from_.value_or(kNotDriven));
   p.put(epoch_);
   p.put(owner_);
   p.put(static_cast<std::uint32_t>(planner_state_));
@@ -90,7 +94,7 @@ bool DynamicsService::load(std::span<const std::byte> bytes) {
   mode_id_ = saved.mode_id;
   command_ = saved.command;
   if (saved.command_step != kNone) command_step_ = saved.command_step;
-  if (saved.driven_from != kNone) driven_from_ = saved.driven_from;
+  if (saved.driven_from != kNotDriven) driven_from_ = saved.driven_from;
   epoch_ = saved.epoch;
   owner_ = saved.owner;
   planner_state_ = static_cast<wire::PlannerState>(saved.planner_state);

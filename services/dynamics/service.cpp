@@ -220,7 +220,7 @@ Drive DynamicsService::choose_drive() {
     return {.kind = scene_.dynamics.on_silence == scene::Safe::hold ? DriveKind::hold : DriveKind::brake};
   }
   validity_ = wire::Validity::valid;
-  if (!driven_from_) driven_from_ = arm_.state().step;
+  if (!driven_from_) driven_from_ = step_now();
   return {.kind = DriveKind::torque,
           .torque_Nm = &command_,
           .includes_gravity = command_includes_gravity_,
@@ -230,8 +230,12 @@ Drive DynamicsService::choose_drive() {
 /// Real time: a command that follows a hold comes in over planner.ramp_s, so that nothing jumps.
 double DynamicsService::share() const {
   if (config_.pace == scene::Pace::lockstep || !(scene_.planner.ramp_s > 0)) return 1;
-  const double driven_s = static_cast<double>(arm_.state().step - *driven_from_) * scene_.dynamics.dt_s;
+  const double driven_s = static_cast<double>(step_now() - *driven_from_) * scene_.dynamics.dt_s;
   return std::min(1.0, driven_s / scene_.planner.ramp_s);
+}
+
+std::int64_t DynamicsService::ramp_steps() const {
+  return static_cast<std::int64_t>(std::ceil(scene_.planner.ramp_s / scene_.dynamics.dt_s));
 }
 
 bool DynamicsService::step() {

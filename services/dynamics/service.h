@@ -52,6 +52,8 @@ class DynamicsService final : public runtime::Service {
   bool fits(const wire::TorqueCommand& c);
   bool owns(const wire::TorqueCommand& c);
   double share() const;
+  std::int64_t step_now() const { return static_cast<std::int64_t>(arm_.state().step); }
+  std::int64_t ramp_steps() const;
   bool poll_lockstep(Time now);
   bool poll_realtime(Time now);
   void count_lateness(Time now);
@@ -95,9 +97,10 @@ class DynamicsService final : public runtime::Service {
   bool command_includes_gravity_ = false;
   wire::PlannerState planner_state_ = wire::PlannerState::idle;
   std::uint64_t epoch_ = 0;
-  bus::WriterId owner_{};                     ///< of the planner that drives the arm
-  std::optional<std::uint64_t> driven_from_;  ///< the step at which it began to, after a hold
-  std::optional<wire::Mode> mode_;            ///< stop or hold while one is in force
+  bus::WriterId owner_{};  ///< of the planner that drives the arm
+  /// The step at which its ramp out of a hold began; a run's first command has its ramp behind it.
+  std::optional<std::int64_t> driven_from_;
+  std::optional<wire::Mode> mode_;  ///< stop or hold while one is in force
   std::uint64_t mode_id_ = 0;
   wire::Validity validity_ = wire::Validity::holding;
 

@@ -189,7 +189,10 @@ void PlannerService::plan(Time now) {
   if (config_.pace == scene::Pace::realtime) {
     const double passed_s =
         memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
-    if (!memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s) planner_.ramp_in();
+    const bool lost = !memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s;
+    // An arm that nobody has driven yet waits at rest for the run to begin: as in lockstep, at once.
+    const bool untouched = state_.validity == wire::Validity::holding && state_.caused_by.size == 0;
+    if (lost && !untouched) planner_.ramp_in();
   }
   const bool lockstep = config_.pace == scene::Pace::lockstep;  // waits as long as it takes: nothing ages
   const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;

@@ -122,8 +122,16 @@ TEST_F(RealTime, AWeakerPlannerTakesOverOnceTheStrongerIsSilent) {
 }
 
 TEST_F(RealTime, AfterASilenceTheCommandComesInOverTheRampWithoutAJump) {
+  for (int i = 0; i < 10; ++i) poll();
+  a.say(*arm, 1, incarnation(), 1.0);
   poll();
-  double before = 0, most = 0;
+  incarnation();
+  EXPECT_EQ(last.torque_applied[0], 1) << "the run's first command starts it";
+  for (int i = 0; i < 400; ++i) poll();
+  incarnation();
+  EXPECT_EQ(last.validity, wire::Validity::command_stale);
+  EXPECT_LT(last.velocity.lpNorm<Eigen::Infinity>(), 1e-3) << "it holds";
+  double before = last.torque_applied[0], most = 0;
   for (int i = 0; i < 400; ++i) {
     a.say(*arm, 1, incarnation(), 1.0);
     poll();
@@ -133,20 +141,6 @@ TEST_F(RealTime, AfterASilenceTheCommandComesInOverTheRampWithoutAJump) {
   }
   EXPECT_NEAR(before, 1, 1e-12);
   EXPECT_LT(most, 1.0 / 200 * 10) << "share rises by 1/200 a step, the arm's own motion adds a little";
-  for (int i = 0; i < 400; ++i) poll();
-  incarnation();
-  EXPECT_EQ(last.validity, wire::Validity::command_stale);
-  EXPECT_LT(last.velocity.lpNorm<Eigen::Infinity>(), 1e-3) << "it holds";
-  before = last.torque_applied[0];
-  most = 0;
-  for (int i = 0; i < 400; ++i) {
-    a.say(*arm, 1, incarnation(), 1.0);
-    poll();
-    incarnation();
-    most = std::max(most, std::abs(last.torque_applied[0] - before));
-    before = last.torque_applied[0];
-  }
-  EXPECT_LT(most, 1.0 / 200 * 10);
 }
 
 TEST(Silence, TheSceneSaysWhetherTheArmHoldsOrOnlyBrakes) {

@@ -64,8 +64,9 @@ struct Told {
   double net_s = 0;        ///< time of the network that passed
 };
 
-Told run(const Faults& faults, scene::Pace pace, double duration_s, std::uint32_t domain) {
-  scene::Scene scene = test::shipped("four_link_avoid", {"planner.method=gyro", "stop=when_reached"});
+Told run(const Faults& faults, scene::Pace pace, double duration_s, std::uint32_t domain,
+         const char* method = "planner.method=gyro") {
+  scene::Scene scene = test::shipped("four_link_avoid", {method, "stop=when_reached"});
   scene.duration_s = duration_s;
   const auto here = node(domain), there = node(domain + 1);
   wire::Subscription<wire::RunSummary> summaries(*here);
@@ -133,6 +134,16 @@ TEST(Faults, InRealTimeTheArmReachesOrHoldsAndTouchesNothing) {
     EXPECT_EQ(t.report.state == wire::PlannerState::reached, reaches)
         << faults.name << ": " << t.report.detail;
   }
+}
+
+// The paper's method remembers how it began: a start that differs (a ramp) ends on another way.
+TEST(Faults, OnAGoodNetworkRealTimeTakesTheWayOfLockstep) {
+  const char* method = "planner.method=gyro_paper";
+  const Told lockstep = run({}, scene::Pace::lockstep, 9, 110, method);
+  const Told realtime = run({}, scene::Pace::realtime, 9, 112, method);
+  EXPECT_EQ(realtime.report.state, wire::PlannerState::reached);
+  EXPECT_NEAR(realtime.report.time_to_goal_s, lockstep.report.time_to_goal_s, 0.1);
+  EXPECT_NEAR(realtime.report.clearance_min_m, lockstep.report.clearance_min_m, 1e-3);
 }
 
 TEST(Faults, InLockstepABadNetworkChangesTheTimeNotTheTrajectory) {

@@ -56,7 +56,8 @@ def jumps(states):
     for before, after in zip(states, states[1:]):
         if before["incarnation"] != after["incarnation"] or int(after["step"]) != int(before["step"]) + 1:
             continue
-        if before["validity"] == "0" or after["validity"] != "0":
+        started = not before["caused_by[0].service"]  # by the first command of a run, as in lockstep
+        if started or before["validity"] == "0" or after["validity"] != "0":
             continue
         change = max(abs(a - b) for a, b in zip(numbers(after, "torque_applied"), numbers(before, "torque_applied")))
         worst = max(worst, change)
