@@ -34,6 +34,7 @@ Attraction::Attraction(const Arm& arm, const scene::PlannerOptions& options)
     : options_(options),
       torque_(Eigen::VectorXd::Zero(arm.n())),
       qdd_(torque_),
+      momentum_(torque_),
       WJ_(Eigen::MatrixXd::Zero(arm.n(), 6)),
       W_(Eigen::MatrixXd::Identity(arm.n(), arm.n())),
       W_llt_(W_) {}
@@ -75,6 +76,8 @@ void Attraction::toward_joints(const Arm& arm, const scene::Goal& goal, double s
   qdd_ *= tip_speed > options_.vmax_mps ? slow * options_.vmax_mps / tip_speed : slow;
   qdd_ = -options_.kv * (arm.qd - qdd_);
   torque_.noalias() = arm.M * qdd_;
+  momentum_.noalias() = arm.M * arm.qd;
+  braking_ = options_.kv * arm.qd.dot(momentum_);
   potential_ = 0;
   for (int j = 0; j < arm.n(); ++j) {
     const double e_j = goal.joints[j] - arm.q[j];
@@ -105,11 +108,22 @@ void Attraction::map(const Arm& arm, Eigen::Index rows) noexcept {
   Lam_inverse_.bottomRightCorner(rows, rows).noalias() = J.lazyProduct(WJ);
   operational_inertia(rows, 1);
   if (rows == 3) a_.head<3>().setZero();
-  const Eigen::Matrix<double, 6, 1> f = Lam_inverse_.llt().solve(a_);
+  Lam_.compute(Lam_inverse_);
+  const Eigen::Matrix<double, 6, 1> f = Lam_.solve(a_);
+  brake(arm, rows);
   torque_.noalias() = arm.J_E.transpose().lazyProduct(f);
   const double a2 = a_.squaredNorm(), e = error_.position_m, inertia = a2 > 0 ? f.dot(a_) / a2 : 0;
   potential_ = 0.5 * options_.kp * inertia * (e * e + error_.angle_rad * error_.angle_rad);
   qdd_.noalias() = arm.M_inverse * torque_;
+}
+
+// The power of the mapping's answer to -kv xdot alone.
+void Attraction::brake(const Arm& arm, Eigen::Index rows) noexcept {
+  Eigen::Matrix<double, 6, 1> v = Eigen::Matrix<double, 6, 1>::Zero();
+  v.tail(rows) = arm.V_WE.tail(rows);
+  const Eigen::Matrix<double, 6, 1> f = Lam_.solve(v);
+  momentum_.noalias() = arm.M * arm.qd;
+  braking_ = options_.kv * momentum_.dot(WJ_.rightCols(rows).lazyProduct(f.tail(rows)));
 }
 
 // qdd = W^-1 J^T (J W^-1 J^T + lam2/10)^-1 a, tau = M qdd, where W weighs down a joint near a limit it is
@@ -130,10 +144,12 @@ void Attraction::map_with_limits(const Arm& arm, Eigen::Index rows) noexcept {
     Lam_inverse_.setIdentity();
     Lam_inverse_.bottomRightCorner(rows, rows).noalias() = J.lazyProduct(WJ);
     operational_inertia(rows, 0.1);
-    const Eigen::Matrix<double, 6, 1> f = Lam_inverse_.llt().solve(a_);
+    Lam_.compute(Lam_inverse_);
+    const Eigen::Matrix<double, 6, 1> f = Lam_.solve(a_);
     qdd_.noalias() = WJ.lazyProduct(f.tail(rows));
   }
   torque_.noalias() = arm.M * qdd_;
+  brake(arm, rows);
 }
 
 bool Attraction::beyond_limits(const Arm& arm, const scene::Goal& goal) noexcept {

@@ -32,6 +32,9 @@ class Attraction {
   const GoalError& error() const noexcept { return error_; }
   /// kp/2 e^T Lam e, with the inertia along the wanted acceleration for Lam: energy of the pull [J].
   double potential_J() const noexcept { return potential_; }
+  /// What the velocity term of the pull takes out of the arm: kv xdot^T Lam xdot [W], >= 0 without joint
+  /// limits.
+  double braking_W() const noexcept { return braking_; }
   /// Where the target is now, world (the tip where the goal is of joints).
   const Eigen::Vector3d& target_W() const noexcept { return target_W_; }
   /// A joint target lies outside the joint limits.
@@ -44,16 +47,18 @@ class Attraction {
   void toward_joints(const Arm& arm, const scene::Goal& goal, double slow) noexcept;
   void map(const Arm& arm, Eigen::Index rows) noexcept;
   void map_with_limits(const Arm& arm, Eigen::Index rows) noexcept;
+  void brake(const Arm& arm, Eigen::Index rows) noexcept;
   void operational_inertia(Eigen::Index rows, double scale) noexcept;
 
   const scene::PlannerOptions& options_;
   GoalError error_;
-  double potential_ = 0;
+  double potential_ = 0, braking_ = 0;
   Eigen::Vector3d target_W_ = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 6, 1> a_ =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< angular part unused for positions
   Eigen::Matrix<double, 6, 6> Lam_inverse_ = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::VectorXd torque_, qdd_;
+  Eigen::LLT<Eigen::Matrix<double, 6, 6>> Lam_;
+  Eigen::VectorXd torque_, qdd_, momentum_;
   Eigen::MatrixXd WJ_;  ///< n x 6: W^-1 J^T
   Eigen::MatrixXd W_;
   Eigen::LLT<Eigen::MatrixXd> W_llt_;

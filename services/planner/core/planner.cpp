@@ -88,6 +88,7 @@ struct Planner::Impl {
   GoalError goal_error;
   Vector3d target_W = Vector3d::Zero();
   double tip_speed = 0;
+  double pull_share = 1;  // of the attraction that ramp and amax let through
   Memory memory;
 };
 
@@ -340,12 +341,15 @@ bool Planner::Impl::ask_for_escape(const Input& in, const Verdict& verdict) noex
 void Planner::Impl::steer(const Input& in, bool unreachable, VectorXd& tau) noexcept {
   if (has_goal && !unreachable) tau_att = attraction.torque();
   if (memory.ramp_asked) memory.ramp_start_s = in.t_s, memory.ramp_asked = 0;
-  if (memory.ramp_start_s >= 0 && options.ramp_s > 0)
-    tau_att *= std::clamp((in.t_s - memory.ramp_start_s) / options.ramp_s, 0.0, 1.0);
+  const bool ramping = memory.ramp_start_s >= 0 && options.ramp_s > 0;
+  const double ramped = ramping ? std::clamp((in.t_s - memory.ramp_start_s) / options.ramp_s, 0.0, 1.0) : 1;
+  tau_att *= ramped;
   qdd_att = tau_att;
+  pull_share = ramped;
   arm.M_llt.solveInPlace(qdd_att);
   const double most = qdd_att.lpNorm<Eigen::Infinity>();
   if (most > options.amax) {
+    pull_share *= options.amax / most;
     tau_att *= options.amax / most;
     qdd_att *= options.amax / most;
   }
@@ -368,12 +372,13 @@ void Planner::Impl::steer(const Input& in, bool unreachable, VectorXd& tau) noex
 }
 
 // Circulation is not powerless: it spends from a tank that holds the pull's energy at the start and is filled
-// by what damping takes out.  1: open; it closes smoothly over the last tenth.
+// by what damping and the pull's own braking take out.  1: open; it closes smoothly over the last tenth.
 double Planner::Impl::open_tank(double dt_s) noexcept {
   if (memory.tank_full_J < 0) memory.tank_J = memory.tank_full_J = attraction.potential_J();
   qdd.noalias() = arm.M * arm.qd;
-  memory.tank_J =
-      std::clamp(memory.tank_J + dt_s * options.damping * arm.qd.dot(qdd), 0.0, memory.tank_full_J);
+  const double taken_W =
+      options.damping * arm.qd.dot(qdd) + pull_share * std::max(attraction.braking_W(), 0.0);
+  memory.tank_J = std::clamp(memory.tank_J + dt_s * taken_W, 0.0, memory.tank_full_J);
   return memory.tank_full_J > 0 ? smooth_step(10 * memory.tank_J / memory.tank_full_J) : 0;
 }
 
