@@ -171,7 +171,10 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
       if (std::count(robot.self_pairs.begin(), robot.self_pairs.end(), both) > 0) own_.push_back({a, b});
     }
   links_.resize(bodies_.size());
-  for (std::size_t k = 0; k < bodies_.size(); ++k) links_[k].now.shape = bodies_[k].solid_B.shape;
+  for (std::size_t k = 0; k < bodies_.size(); ++k) {
+    links_[k].now.shape = bodies_[k].solid_B.shape;
+    links_[k].solid = bodies_[k].solid_B;
+  }
 }
 
 void Pairs::clear() noexcept {
@@ -246,6 +249,7 @@ void Pairs::find_self(const Arm& arm) noexcept {
     }
     pair.shape = b.index;
     pair.link = b.link;
+    pair.span_m = 2 * b.solid_B.bound_m;
     pair.other_link = a.link;
     pair.item = &item;
     pair.n = pair.at.normal;
@@ -274,6 +278,7 @@ void Pairs::measure(const Body& body, const Obstacles& obstacles) noexcept {
     pair.shape = body.index;
     pair.link = body.link;
     pair.obstacle = item.now.id;
+    pair.span_m = 2 * body.solid_B.bound_m;
     pair.item = &item;
     pair.n = pair.at.normal;
     offer(pair);

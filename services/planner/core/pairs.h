@@ -69,6 +69,7 @@ struct Pair {
   int shape = 0, link = 0;     ///< shapes are counted from base to tip
   int other_link = kNoLink;    ///< pairs of two links: the one that stands for the obstacle; -1: the base
   std::uint32_t obstacle = 0;  ///< id
+  double span_m = 0;           ///< the shape is no longer than this
   const Obstacles::Item* item = nullptr;
   geometry::Closest at;
   double d = 0;                                  ///< distance the laws see: inflation taken off [m]
