@@ -10,6 +10,7 @@
 
 #include "common/geometry/solid.h"
 #include "common/rbd/rbd.h"
+#include "services/planner/core/reachable.h"
 
 namespace hamel::client {
 
@@ -95,7 +96,10 @@ lie::Pose before_grasp(const scene::Robot& robot, const scene::Scene& s, const E
         room_m = std::min(room_m, geometry::closest(geometry::solid(l.shape, X_WS), other).distance_m);
       }
     }
-    if (room_m >= kGoalClear_m) return {X_WE.R, X_WE.p + back_W};
+    scene::Goal goal;
+    goal.kind = scene::GoalKind::pose;
+    goal.X_WG = {X_WE.R, X_WE.p + back_W};
+    if (room_m >= kGoalClear_m && planner::reach(robot.chain, goal, {}).reachable) return goal.X_WG;
   }
   return X_WE;
 }

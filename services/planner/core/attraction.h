@@ -33,7 +33,9 @@ class Attraction {
   /// kp/2 e^T Lam e, with the inertia along the wanted acceleration for Lam: energy of the pull [J].
   double potential_J() const noexcept { return potential_; }
   /// Where the target is now, world (the tip where the goal is of joints).
-  const Eigen::Vector3d& target_W() const noexcept { return target_W_; }
+  const Eigen::Vector3d& target_W() const noexcept { return X_WT_.p; }
+  /// The same with the orientation that a pose goal asks for.
+  const lie::Pose& target() const noexcept { return X_WT_; }
   /// A joint target lies outside the joint limits.
   static bool beyond_limits(const Arm& arm, const scene::Goal& goal) noexcept;
   /// The joint that the attraction presses against its limit, or -1.
@@ -49,7 +51,7 @@ class Attraction {
   const scene::PlannerOptions& options_;
   GoalError error_;
   double potential_ = 0;
-  Eigen::Vector3d target_W_ = Eigen::Vector3d::Zero();
+  lie::Pose X_WT_;
   Eigen::Matrix<double, 6, 1> a_ =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< angular part unused for positions
   Eigen::Matrix<double, 6, 6> Lam_inverse_ = Eigen::Matrix<double, 6, 6>::Zero();
