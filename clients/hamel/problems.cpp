@@ -8,13 +8,17 @@
 #include <map>
 #include <optional>
 
+#include "common/geometry/solid.h"
 #include "common/rbd/rbd.h"
+#include "services/planner/core/reachable.h"
 
 namespace hamel::client {
 
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kGoalClear_m = 0.02, kBack_m = 0.01, kMostBack_m = 0.2;
 
 std::vector<double> numbers(const YAML::Node& node, std::size_t count) {
   auto v = node.as<std::vector<double>>();
@@ -75,6 +79,31 @@ Eigen::VectorXd joints(const std::map<std::string, double>& named, const model::
   return q;
 }
 
+// The end effector's pose at q, drawn back along its z axis until its link is clear.
+lie::Pose before_grasp(const scene::Robot& robot, const scene::Scene& s, const Eigen::VectorXd& q) {
+  rbd::Workspace ws(robot.chain);
+  rbd::positions(robot.chain, q, ws);
+  const lie::Pose X_WE = rbd::tip(robot.chain, ws);
+  for (double back_m = 0; back_m < kMostBack_m; back_m += kBack_m) {
+    const Eigen::Vector3d back_W = -back_m * X_WE.R.col(2);
+    double room_m = kGoalClear_m;
+    for (const scene::LinkShape& l : robot.shapes) {
+      if (l.link != robot.chain.n() - 1) continue;
+      lie::Pose X_WS = ws.X_WB.back() * l.X_LS;
+      X_WS.p += back_W;
+      for (const scene::ScriptedObstacle& o : s.perception.obstacles) {
+        const auto other = geometry::solid(o.at_start.shape, o.at_start.X_WO);
+        room_m = std::min(room_m, geometry::closest(geometry::solid(l.shape, X_WS), other).distance_m);
+      }
+    }
+    scene::Goal goal;
+    goal.kind = scene::GoalKind::pose;
+    goal.X_WG = {X_WE.R, X_WE.p + back_W};
+    if (room_m >= kGoalClear_m && planner::reach(robot.chain, goal, {}).reachable) return goal.X_WG;
+  }
+  return X_WE;
+}
+
 void read_request(const YAML::Node& root, const scene::Robot& robot, scene::Scene& s) {
   const YAML::Node start = root["start_state"]["joint_state"];
   const auto names = start["name"].as<std::vector<std::string>>();
@@ -87,12 +116,10 @@ void read_request(const YAML::Node& root, const scene::Robot& robot, scene::Scen
   named.clear();
   for (const YAML::Node& c : goals[0]["joint_constraints"])
     named[c["joint_name"].as<std::string>()] = c["position"].as<double>();
-  rbd::Workspace ws(robot.chain);
-  rbd::positions(robot.chain, joints(named, robot.chain, goals.Mark()), ws);
   s.goal = scene::Goal{};
   s.goal->id = 1;
   s.goal->kind = scene::GoalKind::pose;
-  s.goal->X_WG = rbd::tip(robot.chain, ws);
+  s.goal->X_WG = before_grasp(robot, s, joints(named, robot.chain, goals.Mark()));
 }
 
 /// One problem; what is wrong with it goes to `found`.

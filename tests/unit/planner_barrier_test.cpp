@@ -100,7 +100,7 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
     const Pair& pair = pairs.items()[0];
     const Vector3d bias = rbd::point_bias_acceleration(arm.chain, arm.ws, 3, now.on_axis, arm.qd);
     const double rate = -pair.n.dot(pair.v_relative);
-    const double second = -pair.n.dot(bias) + distance_curvature(pair, arm.angular_velocity(3));
+    const double second = -pair.n.dot(bias) + distance_curvature(pair, arm.angular_velocity(3), 1e-3);
     EXPECT_NEAR(rate, (after.distance_m - before.distance_m) / (2 * h), 1e-5) << k;
     const double measured = (after.distance_m - 2 * now.distance_m + before.distance_m) / (h * h);
     // an obstacle that turns accelerates its own points; the planner leaves that out

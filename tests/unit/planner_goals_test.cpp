@@ -39,6 +39,25 @@ TEST(Reach, RefusesNoGoalThatAConfigurationMeets) {
   EXPECT_EQ(refused, 0);
 }
 
+TEST(Reach, KnowsAnglesBeyondHalfATurn) {
+  test::Random rng(6);
+  int refused = 0;
+  for (int k = 0; k < 200; ++k) {
+    model::ChainSpec spec = test::random_chain(rng, 7).spec();
+    for (model::Joint& j : spec.joints) j.limits.lower = -0.02, j.limits.upper = 3.8;
+    spec.joints[0].limits.lower = 3.3;
+    const model::Chain chain = model::build(std::move(spec)).value();
+    const VectorXd q = VectorXd::Constant(7, 3.5) + rng.vector(7, 0.2);
+    rbd::Workspace ws(chain);
+    rbd::positions(chain, q, ws);
+    scene::Goal goal;
+    goal.kind = scene::GoalKind::pose;
+    goal.X_WG = rbd::tip(chain, ws);
+    refused += !reach(chain, goal, {}).reachable;
+  }
+  EXPECT_EQ(refused, 0);
+}
+
 TEST(Reach, RefusesWhatIsBeyondTheArmAndKnowsTheNearestPlace) {
   const scene::Robot robot = test::planar_arm(4, 0.1, 0.05);
   for (double angle = 0; angle < 6; angle += 0.5) {

@@ -49,16 +49,15 @@ void Attraction::update(const Arm& arm, const scene::Goal& goal, double age_s, d
 void Attraction::toward_pose(const Arm& arm, const scene::Goal& goal, double age_s, double slow) noexcept {
   const bool pose = goal.kind == scene::GoalKind::pose;
   const double rate = options_.kp / options_.kv;
-  target_W_ = goal.X_WG.p + age_s * goal.V_WG.tail<3>();
-  const Vector3d e = target_W_ - arm.X_WE.p;
+  X_WT_.p = goal.X_WG.p + age_s * goal.V_WG.tail<3>();
+  const Vector3d e = X_WT_.p - arm.X_WE.p;
   const Vector3d v_d = slow * saturated(rate * e, options_.vmax_mps);
   a_.tail<3>() = -options_.kv * (arm.V_WE.tail<3>() - goal.V_WG.tail<3>() - v_d);
   error_ = {e.norm(), 0, e.norm() / options_.goal_tolerance_m};
   if (pose) {
     const Vector3d turned = age_s * goal.V_WG.head<3>();
-    const Eigen::Matrix3d R_WG =
-        Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()).toRotationMatrix() * goal.X_WG.R;
-    const Vector3d r = rotation_error(R_WG, arm.X_WE.R);
+    X_WT_.R = Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()).toRotationMatrix() * goal.X_WG.R;
+    const Vector3d r = rotation_error(X_WT_.R, arm.X_WE.R);
     const Vector3d w_d = slow * saturated(rate * r, options_.angular_vmax_radps);
     a_.head<3>() = -options_.kv * (arm.V_WE.head<3>() - goal.V_WG.head<3>() - w_d);
     error_.angle_rad = r.norm();
@@ -70,7 +69,7 @@ void Attraction::toward_pose(const Arm& arm, const scene::Goal& goal, double age
 }
 
 void Attraction::toward_joints(const Arm& arm, const scene::Goal& goal, double slow) noexcept {
-  target_W_ = arm.X_WE.p;
+  X_WT_.p = arm.X_WE.p;
   qdd_ = (options_.kp / options_.kv) * (goal.joints - arm.q);  // v_d, then the acceleration
   const double tip_speed = (arm.J_E.bottomRows<3>().lazyProduct(qdd_)).norm();
   qdd_ *= tip_speed > options_.vmax_mps ? slow * options_.vmax_mps / tip_speed : slow;

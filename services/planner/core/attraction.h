@@ -36,7 +36,9 @@ class Attraction {
   /// limits.
   double braking_W() const noexcept { return braking_; }
   /// Where the target is now, world (the tip where the goal is of joints).
-  const Eigen::Vector3d& target_W() const noexcept { return target_W_; }
+  const Eigen::Vector3d& target_W() const noexcept { return X_WT_.p; }
+  /// The same with the orientation that a pose goal asks for.
+  const lie::Pose& target() const noexcept { return X_WT_; }
   /// A joint target lies outside the joint limits.
   static bool beyond_limits(const Arm& arm, const scene::Goal& goal) noexcept;
   /// The joint that the attraction presses against its limit, or -1.
@@ -53,7 +55,7 @@ class Attraction {
   const scene::PlannerOptions& options_;
   GoalError error_;
   double potential_ = 0, braking_ = 0;
-  Eigen::Vector3d target_W_ = Eigen::Vector3d::Zero();
+  lie::Pose X_WT_;
   Eigen::Matrix<double, 6, 1> a_ =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< angular part unused for positions
   Eigen::Matrix<double, 6, 6> Lam_inverse_ = Eigen::Matrix<double, 6, 6>::Zero();

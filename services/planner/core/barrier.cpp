@@ -25,9 +25,33 @@ constexpr double kJointPrice = 1e6;
 constexpr double kTorquePrice = 1e6;
 constexpr double kLeastGive = 1e-7;
 
+/// How much nearer two lines come by sliding on each other, whose distance is
+///   F = tau (m_link s + m_there t) + (s^2 - 2 cosine s t + t^2)/(2 D)  after tau, |s| and |t| bounded.
+struct Sliding {
+  double m_link = 0, m_there = 0, most_link = 0, most_there = 0, cosine = 0;
+
+  double least(double tau, double D) const noexcept {
+    const double b_s = -tau * D * m_link, b_t = -tau * D * m_there, sine2 = 1 - cosine * cosine;
+    const auto F = [&](double s, double t) {
+      return (-b_s * s - b_t * t + 0.5 * (s * s - 2 * cosine * s * t + t * t)) / D;
+    };
+    if (sine2 > 1e-12) {
+      const double s = (b_s + cosine * b_t) / sine2, t = (b_t + cosine * b_s) / sine2;
+      if (std::abs(s) <= most_link && std::abs(t) <= most_there) return F(s, t);
+    }
+    double least = 0;  // on the border
+    for (const double sign : {-1.0, 1.0}) {
+      const double s = sign * most_link, t = sign * most_there;
+      least = std::min(least, F(s, std::clamp(b_t + cosine * s, -most_there, most_there)));
+      least = std::min(least, F(std::clamp(b_s + cosine * t, -most_link, most_link), t));
+    }
+    return least;
+  }
+};
+
 }  // namespace
 
-double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept {
+double distance_curvature(const Pair& pair, const Vector3d& omega_link, double within_s) noexcept {
   const geometry::Closest& c = pair.at;
   const geometry::Obstacle& o = pair.item->now;
   const Vector3d omega_o = o.V_WO.head<3>();
@@ -46,15 +70,17 @@ double distance_curvature(const Pair& pair, const Vector3d& omega_link) noexcept
   const double along = pair.n.dot(w);
   const double F_tautau = (w.squaredNorm() - along * along) / D;
   const bool slides_there = !c.obstacle_axis.isZero();
-  const double m_link =
-      c.slides_on_link ? -(c.link_axis.dot(w) / D + pair.n.dot(omega_link.cross(c.link_axis))) : 0;
-  const double m_there =
-      slides_there ? c.obstacle_axis.dot(w) / D + pair.n.dot(omega_o.cross(c.obstacle_axis)) : 0;
-  // H = [1, -cos; -cos, 1]/D between two lines, 1/D for one; nearly parallel lines count as one.
-  const double cosine = c.slides_on_link && slides_there ? c.link_axis.dot(c.obstacle_axis) : 0;
-  const double sine2 = 1 - cosine * cosine;
-  if (sine2 < 1e-6) return F_tautau - D * m_link * m_link;
-  return F_tautau - D * (m_link * m_link + 2 * cosine * m_link * m_there + m_there * m_there) / sine2;
+  Sliding s;
+  if (c.slides_on_link) {
+    s.m_link = -(c.link_axis.dot(w) / D + pair.n.dot(omega_link.cross(c.link_axis)));
+    s.most_link = pair.span_m;
+  }
+  if (slides_there) {
+    s.m_there = c.obstacle_axis.dot(w) / D + pair.n.dot(omega_o.cross(c.obstacle_axis));
+    s.most_there = 2 * pair.item->solid.bound_m;
+  }
+  if (c.slides_on_link && slides_there) s.cosine = c.link_axis.dot(c.obstacle_axis);
+  return F_tautau + 2 / (within_s * within_s) * s.least(within_s, D);
 }
 
 Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options)
@@ -91,7 +117,7 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
     const Vector3d omega = arm.angular_velocity(pair.link);
     const Vector3d bias = pairs.bias(arm, pair);
     const double h = pair.d - options_.dmin_m, hd = -pair.n.dot(pair.v_relative);
-    const double curvature = std::min(distance_curvature(pair, omega), 0.0);
+    const double curvature = std::min(distance_curvature(pair, omega, 1 / g), 0.0);
     A_.col(rows_).noalias() = -pairs.J(k).transpose().lazyProduct(pair.n);
     const Eigen::Index before = rows_;
     add_row(arm, -2 * g * hd - g * g * h + pair.n.dot(bias) - curvature, kDistancePrice);

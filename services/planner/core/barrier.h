@@ -14,7 +14,10 @@ namespace hamel::planner {
 /// d2/dt2 of the distance that comes from sliding and turning alone: no acceleration in it.  The distance is
 /// the least over positions s on the link's axis and t on the obstacle's; with F(s, t, time) = |y - x|
 ///   curvature = F_tautau - m^T H^-1 m,  m = (F_s,tau, F_t,tau), H the Hessian in those of s, t that slide.
-double distance_curvature(const Pair& pair, const Eigen::Vector3d& omega_link) noexcept;
+/// Sliding goes no farther than the two are long in `within_s`: nearly parallel lines would otherwise slide
+/// without bound, and the derivative with them.
+/// @param within_s  > 0: how far ahead the distance matters
+double distance_curvature(const Pair& pair, const Eigen::Vector3d& omega_link, double within_s) noexcept;
 
 class Barrier {
  public:

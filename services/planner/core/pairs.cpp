@@ -159,7 +159,10 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
     const scene::LinkShape& s = robot.shapes[k];
     if (s.link < -1 || s.link >= robot.chain.n()) continue;
     bodies_.push_back({k, 0, s.link, geometry::solid(s.shape, s.X_LS), {}});
-    if (s.link == robot.chain.n() - 1) tip_radius_m_ = geometry::enclosing_capsule(s.shape).radius_m;
+    if (s.link != robot.chain.n() - 1) continue;
+    tip_E_.push_back(geometry::solid(s.shape, lie::inverse(robot.chain.X_NE()) * s.X_LS));
+    const geometry::Solid tip = geometry::solid({}, {});  // a point
+    tip_radius_m_ = std::max(tip_radius_m_, -geometry::closest(tip, tip_E_.back()).distance_m);
   }
   std::stable_sort(bodies_.begin(), bodies_.end(),
                    [](const Body& a, const Body& b) { return a.link < b.link; });
@@ -171,7 +174,10 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
       if (std::count(robot.self_pairs.begin(), robot.self_pairs.end(), both) > 0) own_.push_back({a, b});
     }
   links_.resize(bodies_.size());
-  for (std::size_t k = 0; k < bodies_.size(); ++k) links_[k].now.shape = bodies_[k].solid_B.shape;
+  for (std::size_t k = 0; k < bodies_.size(); ++k) {
+    links_[k].now.shape = bodies_[k].solid_B.shape;
+    links_[k].solid = bodies_[k].solid_B;
+  }
 }
 
 void Pairs::clear() noexcept {
@@ -246,6 +252,7 @@ void Pairs::find_self(const Arm& arm) noexcept {
     }
     pair.shape = b.index;
     pair.link = b.link;
+    pair.span_m = 2 * b.solid_B.bound_m;
     pair.other_link = a.link;
     pair.item = &item;
     pair.n = pair.at.normal;
@@ -274,11 +281,22 @@ void Pairs::measure(const Body& body, const Obstacles& obstacles) noexcept {
     pair.shape = body.index;
     pair.link = body.link;
     pair.obstacle = item.now.id;
+    pair.span_m = 2 * body.solid_B.bound_m;
     pair.item = &item;
     pair.n = pair.at.normal;
     offer(pair);
   }
   clearance_m_ = std::min(clearance_m_, nearest.at.distance_m);
+}
+
+bool Pairs::blocks(const Obstacles::Item& item, const lie::Pose& X_WE, bool turns,
+                   double margin_m) const noexcept {
+  const auto near = [&](const geometry::Solid& solid_W) {
+    return geometry::distance_bound(solid_W, item.solid) < margin_m &&
+           geometry::closest(solid_W, item.solid).distance_m < margin_m;
+  };
+  if (turns) return near(geometry::solid({geometry::ShapeKind::sphere, {tip_radius_m_, 0, 0}}, X_WE));
+  return std::any_of(tip_E_.begin(), tip_E_.end(), [&](const auto& s_E) { return near(X_WE * s_E); });
 }
 
 // When the table is full the farthest pair makes room.

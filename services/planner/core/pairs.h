@@ -69,6 +69,7 @@ struct Pair {
   int shape = 0, link = 0;     ///< shapes are counted from base to tip
   int other_link = kNoLink;    ///< pairs of two links: the one that stands for the obstacle; -1: the base
   std::uint32_t obstacle = 0;  ///< id
+  double span_m = 0;           ///< the shape is no longer than this
   const Obstacles::Item* item = nullptr;
   geometry::Closest at;
   double d = 0;                                  ///< distance the laws see: inflation taken off [m]
@@ -125,8 +126,10 @@ class Pairs {
   /// Smallest distance of two links that must not touch; +inf where none are within range.
   double self_clearance_m() const noexcept { return self_clearance_m_; }
   int dropped() const noexcept { return dropped_; }
-  /// Radius about the end effector that a target must have free [m].
-  double tip_radius_m() const noexcept { return tip_radius_m_; }
+  /// The obstacle leaves less than `margin_m` to the last link with the end effector at X_WE; `turns`:
+  /// however the link is turned there (then true only where the ball about the end effector inside it is too
+  /// near).
+  bool blocks(const Obstacles::Item& item, const lie::Pose& X_WE, bool turns, double margin_m) const noexcept;
 
  private:
   struct Body {
@@ -154,7 +157,8 @@ class Pairs {
   std::size_t count_ = 0, self_count_ = 0;
   std::vector<Nearest> nearest_;
   Eigen::Index n_ = 0;
-  Eigen::MatrixXd J_, MJ_, J_other_;  ///< all Jacobians side by side; M^-1 J^T of one; the other link's
+  Eigen::MatrixXd J_, MJ_, J_other_;    ///< all Jacobians side by side; M^-1 J^T of one; the other link's
+  std::vector<geometry::Solid> tip_E_;  ///< shapes of the last link, seen from the end effector
   double clearance_m_ = 0, self_clearance_m_ = 0, tip_radius_m_ = 0;
   bool base_touched_ = false;
   int dropped_ = 0, shapes_ = 0;  ///< shapes_: bodies that are not the base's

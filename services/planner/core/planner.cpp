@@ -435,15 +435,12 @@ double Planner::Impl::slow_down(const Input& in) const noexcept {
 }
 
 bool Planner::Impl::target_blocked() const noexcept {
-  const Vector3d& target = attraction.target_W();
-  const geometry::Solid tip = geometry::solid({geometry::ShapeKind::sphere, {pairs.tip_radius_m(), 0, 0}},
-                                              {Eigen::Matrix3d::Identity(), target});
-  for (const Obstacles::Item& item : obstacles.items()) {
-    const double margin = item.inflation_m + (options.barrier_gain > 0 ? options.dmin_m : 0);
-    if (geometry::distance_bound(tip, item.solid) > margin) continue;
-    if (geometry::closest(tip, item.solid).distance_m < margin) return true;
-  }
-  return false;
+  const bool turns = goal.kind != scene::GoalKind::pose;
+  const double dmin = options.barrier_gain > 0 ? options.dmin_m : 0;
+  const auto items = obstacles.items();
+  return std::any_of(items.begin(), items.end(), [&](const Obstacles::Item& item) {
+    return pairs.blocks(item, attraction.target(), turns, item.inflation_m + dmin);
+  });
 }
 
 void Planner::Impl::remember_tip() noexcept {

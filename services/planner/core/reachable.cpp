@@ -25,8 +25,11 @@ class Search {
     low_.resize(chain.n());
     high_.resize(chain.n());
     for (int i = 0; i < chain.n(); ++i) {
-      low_[i] = std::max(chain.joint(i).limits.lower, -std::numbers::pi);
-      high_[i] = std::min(chain.joint(i).limits.upper, std::numbers::pi);
+      // One turn is enough of a joint that has more; one with less may have it beyond pi.
+      const double lower = chain.joint(i).limits.lower, upper = chain.joint(i).limits.upper;
+      const bool turns = upper - lower > 2 * std::numbers::pi;
+      low_[i] = turns ? std::max(lower, std::min(-std::numbers::pi, upper - 2 * std::numbers::pi)) : lower;
+      high_[i] = turns ? low_[i] + 2 * std::numbers::pi : upper;
     }
   }
 
