@@ -86,7 +86,8 @@ struct PlannerOptions {
   int escape_rollouts = 16;     ///< waypoints tried for one way out, >= 1
   double escape_horizon_s = 8;  ///< how far ahead a rollout looks, > 0
   double escape_delay_s = 0.2;  ///< the answer enters so long after the question, >= 0
-  /// A target that no configuration meets: STUCK at once and no motion, or as near as can be and then STUCK.
+  /// A target that no configuration meets, or that an obstacle stands over: STUCK at once and no motion, or
+  /// as near as can be and then STUCK.
   Unreachable unreachable = Unreachable::reject;
   double ramp_s = 0.2;  ///< after a restart without memory the command ramps in over it, >= 0
 };

@@ -62,7 +62,8 @@ ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   for (int j = 1; j < chain.n(); ++j) ball.axis_m += chain.joint(j).X_PJ.p.norm() + travel_m(chain.joint(j));
   for (const LinkShape& s : robot.shapes)
     if (s.link == ball.link)
-      ball.radius_m = std::max(ball.radius_m, geometry::enclosing_capsule(s.shape).radius_m);
+      ball.radius_m =
+          std::max(ball.radius_m, (s.X_LS.p - chain.X_NE().p).norm() + geometry::solid(s.shape, {}).bound_m);
   return ball;
 }
 

@@ -16,6 +16,8 @@ constexpr std::uint32_t kCheckpointKind = 0x0203;  // planner, layout 3
 constexpr auto kArmHeard = 200ms;  // an arm speaks at least each 100 ms: so long no other is heard
 constexpr std::uint32_t kArmBits = 0x0fffffff;  // of an obstacle source: the arm it sees for
 constexpr double kMemoryFresh_s = 0.2;          // realtime: older memory is ramped in again
+constexpr double kLeapSlack = 1e-3;             // rad or m that a sample may be off without being wrong
+constexpr int kLeapsBelieved = 3;               // so many leaps in a row are passed over
 constexpr auto kReportPeriod = 10ms;            // realtime: a report each, and one at every change of state
 
 struct SavedGoal {
@@ -136,6 +138,7 @@ bool PlannerService::take_states(Time now) {
     // In lockstep the same state again means that our answer was lost: answer it again.
     const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
     if (s.step % period != 0) continue;
+    if (leaps(s, now)) continue;
     if (have_state_ && config_.pace == scene::Pace::realtime && s.step > state_.step + period)
       ++commands_late_;
     state_ = s;
@@ -143,6 +146,29 @@ bool PlannerService::take_states(Time now) {
     answered_ = false;
   }
   return heard;
+}
+
+/// Real time: no joint can go farther than twice its speed allows, so that such a sample is wrong and passed
+/// over; a few of them in a row are believed, and the arm starts from there with a ramp.
+bool PlannerService::leaps(const wire::ArmState& s, Time now) {
+  if (config_.pace == scene::Pace::lockstep || !have_state_ || s.step <= state_.step) return false;
+  if (s.incarnation != state_.incarnation) return false;
+  const double passed_s = static_cast<double>(s.step - state_.step) * s.dt_s;
+  bool far = false;
+  for (int j = 0; j < scene_.robot.chain.n(); ++j) {
+    const double most = 2 * scene_.robot.chain.joint(j).limits.velocity * passed_s;
+    far |= std::abs(s.position[j] - state_.position[j]) > most + kLeapSlack;
+  }
+  if (!far) {
+    leaps_in_a_row_ = 0;
+    return false;
+  }
+  ++states_discarded_;
+  if (refusals_(now)) spdlog::warn("t = {:.3f} s: the arm's state leaps: passed over", s.t_s);
+  if (++leaps_in_a_row_ <= kLeapsBelieved) return true;
+  leaps_in_a_row_ = 0;
+  planner_.ramp_in();
+  return false;
 }
 
 /// An arm that does not continue the one we know: what we remember of its motion means nothing.
@@ -320,6 +346,7 @@ void PlannerService::publish_status(Time now, wire::ServiceState state) {
                       .detail = wire::to_string(shown_),
                       .counters = {{"cycles", cycles_},
                                    {"commands_late", commands_late_},
+                                   {"states_discarded", states_discarded_},
                                    {"undecodable", state_in_.undecodable() + obstacles_in_.undecodable() +
                                                        goal_in_.undecodable() + mode_in_.undecodable()}}});
 }

@@ -44,6 +44,7 @@ class PlannerService final : public runtime::Service {
   bool take_states(Time now);
   void take_obstacles();
   void meet(const wire::ArmState& s);
+  bool leaps(const wire::ArmState& s, Time now);
   bool answer(Time now);
   void plan(Time now);
   void ask_escape(const Input& in);
@@ -95,6 +96,8 @@ class PlannerService final : public runtime::Service {
       escape_;  ///< valid: a question is out, asked at escape_asked_, its answer due at escape_due_
   std::uint64_t escape_asked_ = 0, escape_due_ = 0;
   runtime::RateLimit refusals_;
+  int leaps_in_a_row_ = 0;
+  std::uint64_t states_discarded_ = 0;
 };
 
 }  // namespace hamel::planner

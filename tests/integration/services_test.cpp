@@ -223,6 +223,37 @@ TEST(Restart, APlannerKilledBeforeItSpokeIsAnsweredFor) {
   std::filesystem::remove_all(folder);
 }
 
+// One wrong sample of an arm is not answered; an arm that stays where it leapt to is believed.
+TEST(Planner, PassesOverASampleThatNoJointCouldReach) {
+  const auto n = node(11);
+  const scene::Scene s = test::shipped("panda_reach");
+  wire::Publisher<wire::ArmState> states(*n);
+  wire::Publisher<wire::ObstacleSet> sets(*n);
+  wire::Subscription<wire::TorqueCommand> commands(*n);
+  auto brain = planner::PlannerService::make(*n, s, {.pace = scene::Pace::realtime});
+  ASSERT_TRUE(brain);
+  wire::ObstacleSet none;
+  none.source = s.arm, none.incarnation = 1;
+  ASSERT_TRUE(sets.publish(none));
+  std::vector<std::uint64_t> answered;
+  const auto say = [&](std::uint64_t step, double leap) {
+    wire::ArmState state;
+    state.arm = s.arm, state.incarnation = 1, state.step = step, state.dt_s = 1e-3;
+    state.t_s = 1e-3 * static_cast<double>(step);
+    state.position = s.q0.array() + leap;
+    state.velocity = state.momentum = state.torque_applied = wire::JointVector::Zero(7);
+    ASSERT_TRUE(states.publish(state));
+    brain.value()->poll(Clock::now());
+    wire::TorqueCommand c;
+    while (commands.take(c)) answered.push_back(c.step);
+  };
+  for (std::uint64_t k = 1; k <= 4; ++k) say(k, 0.001 * static_cast<double>(k));
+  say(5, 0.3);
+  for (std::uint64_t k = 6; k <= 7; ++k) say(k, 0.001 * static_cast<double>(k));
+  for (std::uint64_t k = 8; k <= 12; ++k) say(k, 0.3);
+  EXPECT_EQ(answered, (std::vector<std::uint64_t>{1, 2, 3, 4, 6, 7, 11, 12}));
+}
+
 wire::ObstacleSet set(double t_s, double next_t_s, std::uint32_t source = 1, std::size_t n = 1) {
   wire::ObstacleSet s;
   s.source = source;

@@ -187,8 +187,27 @@ TEST(States, UnreachableIsSaidAtOnceAndNotTried) {
   EXPECT_TRUE(out.torque_Nm.isZero());
 }
 
+TEST(States, AGoalInsideWhatStandsIsSaidAtOnceAndNotTriedUntilThatIsGone) {
+  Bench b;
+  b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
+  const Output out = b.plan();
+  expect(out, State::stuck, Reason::goal_blocked);
+  EXPECT_TRUE(out.torque_Nm.isZero());
+  const RunResult r = b.go(2);
+  EXPECT_EQ(r.last.reason, Reason::goal_blocked);
+  EXPECT_TRUE(r.qd.isZero());
+  b.obstacles[0].V_WO[3] = 0.01;  // it may yet move out of the way
+  expect(b.plan(), State::moving, Reason::none);
+  b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
+  b.obstacles[0].velocity_known = false;
+  expect(b.plan(), State::moving, Reason::none);
+  b.obstacles.clear();
+  EXPECT_EQ(b.go(30).last.state, State::reached);
+}
+
 TEST(States, BlockedGoalIsNamed) {
   Bench b;
+  b.options.unreachable = scene::Unreachable::approach;
   b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
   const RunResult r = b.go(30);
   EXPECT_EQ(r.last.state, State::stuck);

@@ -54,7 +54,7 @@ struct Planner::Impl {
   Verdict see(const Input& in) noexcept;
   void prepare(const Input& in) noexcept;
   Verdict move(const Input& in, VectorXd& tau) noexcept;
-  void steer(const Input& in, bool unreachable, VectorXd& tau) noexcept;
+  void steer(const Input& in, bool refused, VectorXd& tau) noexcept;
   void circulate(const Input& in, VectorXd& tau) noexcept;
   double open_tank(double dt_s) noexcept;
   bool guard(const Input& in, VectorXd& tau) noexcept;
@@ -66,7 +66,7 @@ struct Planner::Impl {
   bool approaching() const noexcept {
     return !goal_reachable && options.unreachable == scene::Unreachable::approach;
   }
-  bool target_blocked() const noexcept;
+  bool target_blocked(bool for_good) const noexcept;
   void remember_tip() noexcept;
   bool pass_waypoint(const Input& in) noexcept;
   bool ask_for_escape(const Input& in, const Verdict& verdict) noexcept;
@@ -261,6 +261,7 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
   const bool steered = has_goal;
   Verdict verdict{State::idle, Reason::none, "no goal"};
   tau_att.setZero();
+  bool refused = false;
   if (steered) {
     if (!memory.goal_started) start_goal(memory, in.t_s);
     attraction.update(arm, goal, in.t_s - memory.goal_start_s, slow_down(in));
@@ -275,7 +276,9 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
         joints ? attraction.beyond_limits(arm, goal)
                : (!goal_reachable && !approaching()) ||
                      (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
-    now.target_blocked = !joints && target_blocked();
+    now.target_blocked = !joints && target_blocked(false);
+    const bool rejects = options.method == Method::gyro && options.unreachable == scene::Unreachable::reject;
+    refused = now.target_blocked && rejects && goal.V_WG.isZero(0) && target_blocked(true);
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
     const bool rollouts = options.method == Method::gyro && options.escapes > 0;
     const std::uint64_t flips = rollouts ? 1 : kFlips;
@@ -286,9 +289,11 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
       verdict = approaching() ? approached(judge(options, memory, now)) : judge(options, memory, now);
     else
       verdict = {State::moving, Reason::none, "escaping by way of a waypoint that rollouts found"};
+    if (refused) verdict = {State::stuck, Reason::goal_blocked, "an obstacle stands over the target"};
     asked = ask_for_escape(in, verdict);
+    refused |= verdict.reason == Reason::unreachable && !approaching();
   }
-  steer(in, verdict.reason == Reason::unreachable && !approaching(), tau);
+  steer(in, refused, tau);
   if (options.method == Method::gyro && guard(in, tau)) {
     memory.infeasible_s = in.t_s;
     if (outcome.torque_bound)
@@ -338,8 +343,8 @@ bool Planner::Impl::ask_for_escape(const Input& in, const Verdict& verdict) noex
 }
 
 // tau = attraction - bj M qd + forces of the obstacles.
-void Planner::Impl::steer(const Input& in, bool unreachable, VectorXd& tau) noexcept {
-  if (has_goal && !unreachable) tau_att = attraction.torque();
+void Planner::Impl::steer(const Input& in, bool refused, VectorXd& tau) noexcept {
+  if (has_goal && !refused) tau_att = attraction.torque();
   if (memory.ramp_asked) memory.ramp_start_s = in.t_s, memory.ramp_asked = 0;
   const bool ramping = memory.ramp_start_s >= 0 && options.ramp_s > 0;
   const double ramped = ramping ? std::clamp((in.t_s - memory.ramp_start_s) / options.ramp_s, 0.0, 1.0) : 1;
@@ -434,12 +439,16 @@ double Planner::Impl::slow_down(const Input& in) const noexcept {
   return span > 0 ? std::clamp(1 - (age - options.stale_slow_s) / span, 0.0, 1.0) : 1.0;
 }
 
-bool Planner::Impl::target_blocked() const noexcept {
+// An obstacle has no room beside it for the last link at the target; for good: it stands, and no place within
+// the tolerance has room either.
+bool Planner::Impl::target_blocked(bool for_good) const noexcept {
   const bool turns = goal.kind != scene::GoalKind::pose;
   const double dmin = options.barrier_gain > 0 ? options.dmin_m : 0;
+  const double slack = for_good ? options.goal_tolerance_m : 0;
   const auto items = obstacles.items();
   return std::any_of(items.begin(), items.end(), [&](const Obstacles::Item& item) {
-    return pairs.blocks(item, attraction.target(), turns, item.inflation_m + dmin);
+    if (for_good && !(item.now.velocity_known && item.now.V_WO.isZero(0))) return false;
+    return pairs.blocks(item, attraction.target(), turns, item.inflation_m + dmin - slack);
   });
 }
 
