@@ -278,8 +278,8 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
     const bool rollouts = options.method == Method::gyro && options.escapes > 0;
     const std::uint64_t flips = rollouts ? 1 : kFlips;
-    now.escaping =
-        options.method == Method::gyro && options.kc > 0 && memory.turn_count > 0 && memory.flips < flips;
+    now.escaping = options.method == Method::gyro && options.kc > 0 && memory.flips < flips &&
+                   in.t_s - memory.pressed_s <= kTurnHold_s;
     now.has_rollouts = rollouts;
     if (!pass_waypoint(in))
       verdict = approaching() ? approached(judge(options, memory, now)) : judge(options, memory, now);
