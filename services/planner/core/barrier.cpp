@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "services/planner/core/force_law.h"
 
@@ -23,6 +24,7 @@ constexpr double kDistancePrice = 1e4;
 constexpr double kSpeedPrice = 1;
 constexpr double kJointPrice = 1e6;
 constexpr double kTorquePrice = 1e6;
+constexpr double kMostOver = 5;  // acceleration limits: what a miss may come to
 constexpr double kLeastGive = 1e-7;
 
 /// How much nearer two lines come by sliding on each other, whose distance is
@@ -136,17 +138,23 @@ void Barrier::add_joint_rows(const Arm& arm, double dt_s) noexcept {
   };
   for (int j = 0; j < arm.n(); ++j) {
     const model::JointLimits& limits = arm.chain.joint(j).limits;
-    const double q = arm.q[j], qd = arm.qd[j], near = std::max(kLimitHorizon, 2 * std::abs(qd) / g);
-    if (q - limits.lower < near) row(j, 1, -2 * g * qd - g * g * (q - limits.lower), kJointPrice);
-    if (limits.upper - q < near) row(j, -1, 2 * g * qd - g * g * (limits.upper - q), kJointPrice);
+    // Braking from full speed along h.. + 2 g h. + g^2 h = 0 takes at most g v/e.
+    const double most = std::numbers::e * acceleration_limit(arm, j) / limits.velocity;
+    const double gj = most > 0 ? std::min(g, most) : g;
+    const double q = arm.q[j], qd = arm.qd[j], near = std::max(kLimitHorizon, 2 * std::abs(qd) / gj);
+    if (q - limits.lower < near) row(j, 1, -2 * gj * qd - gj * gj * (q - limits.lower), kJointPrice);
+    if (limits.upper - q < near) row(j, -1, 2 * gj * qd - gj * gj * (limits.upper - q), kJointPrice);
   }
   hard_rows_ = rows_;
   for (int j = 0; j < arm.n(); ++j) {
-    const model::JointLimits& limits = arm.chain.joint(j).limits;
-    const double qd = arm.qd[j];
-    row(j, 1, std::max(-rate * (limits.velocity + qd), -limits.acceleration), kSpeedPrice);
-    row(j, -1, std::max(-rate * (limits.velocity - qd), -limits.acceleration), kSpeedPrice);
+    const double most = acceleration_limit(arm, j), speed = arm.chain.joint(j).limits.velocity;
+    row(j, 1, std::clamp(-rate * (speed + arm.qd[j]), -most, most), kSpeedPrice);
+    row(j, -1, std::clamp(-rate * (speed - arm.qd[j]), -most, most), kSpeedPrice);
   }
+}
+
+double Barrier::acceleration_limit(const Arm& arm, int j) const noexcept {
+  return std::min(arm.chain.joint(j).limits.acceleration, options_.amax);
 }
 
 // |M a + c + gravity| <= effort.
@@ -184,6 +192,11 @@ Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, Vecto
   x_ = least_norm_.x();
   arm.M_llt.matrixU().solveInPlace(x_);
   a += x_;
+  for (int j = 0; j < arm.n(); ++j) {
+    const double most = kMostOver * acceleration_limit(arm, j), wanted = a[j];
+    a[j] = std::clamp(wanted, -most, most);
+    outcome.infeasible |= a[j] != wanted;
+  }
   for (std::size_t r = 0; r < pair_of_row_.size(); ++r) {
     const auto row = static_cast<Eigen::Index>(r);  // pairs come first
     pairs.guarded()[pair_of_row_[r]].multiplier = u[row] / length_[row];

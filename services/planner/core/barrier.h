@@ -44,6 +44,7 @@ class Barrier {
   void add_row(const Arm& arm, double b, double price) noexcept;
   void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
   void add_joint_rows(const Arm& arm, double dt_s) noexcept;
+  double acceleration_limit(const Arm& arm, int j) const noexcept;
   void add_torque_rows(const Arm& arm) noexcept;
 
   const scene::PlannerOptions& options_;

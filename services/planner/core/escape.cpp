@@ -60,13 +60,14 @@ class Rollout {
     double t_s = 0, error_m = 0;
   };
 
-  Ending run(const EscapeQuestion& from, const VectorXd& waypoint) {
+  /// @param waypoint  none: empty
+  Ending run(const EscapeQuestion& from, const VectorXd& waypoint, double most_s) {
     planner_ = Planner(robot_, options_);
     planner_.set_goal(from.goal);
     q_ = from.q;
     qd_ = from.qd;
     obstacles_ = from.obstacles;
-    const int steps = static_cast<int>(options_.escape_horizon_s / kStep_s);
+    const int steps = static_cast<int>(most_s / kStep_s);
     for (int k = 0; k < steps; ++k) {
       const double t_s = k * kStep_s;
       planner_.plan({.step = static_cast<std::uint64_t>(k),
@@ -83,7 +84,7 @@ class Rollout {
       if (r.state == State::stuck || r.state == State::fault || r.reason == Reason::contact) break;
       advance();
     }
-    return {false, options_.escape_horizon_s, out_.report.target_error_m};
+    return {false, most_s, out_.report.target_error_m};
   }
 
  private:
@@ -125,17 +126,18 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
   from.goal.X_WG.p += from.goal_age_s * from.goal.V_WG.tail<3>();
   Rollout rollout(robot, options);
   Dice dice(question.step * 0x2545f4914f6cdd1dull + question.tries);
+  double most_s = options.escape_horizon_s;
+  if (!question.stuck && rollout.run(from, {}, most_s).reached) return escape;
   for (int k = 0; k < options.escape_rollouts; ++k) {
     const double spread = k % 4 == 0 ? 0.15 : k % 4 == 1 ? 0.3 : k % 4 == 2 ? 0.6 : 1.0;
     const VectorXd waypoint = draw_waypoint(robot.chain, question.q, spread, dice);
-    const Rollout::Ending ending = rollout.run(from, waypoint);
+    const Rollout::Ending ending = rollout.run(from, waypoint, most_s);
     ++escape.rollouts;
     if (!ending.reached) continue;
     escape.found = true;
     escape.waypoint = waypoint;
-    escape.reached_after_s = ending.t_s;
+    escape.reached_after_s = most_s = ending.t_s;
     escape.error_m = ending.error_m;
-    return escape;
   }
   return escape;
 }

@@ -22,6 +22,7 @@ struct EscapeQuestion {
   scene::Goal goal;
   double goal_age_s = 0;  ///< how long the goal has been moving with its twist
   std::uint64_t tries = 0;
+  bool stuck = true;  ///< false: the arm still moves, and may be on its way
 };
 
 /// By way of a configuration, or not at all.
@@ -32,8 +33,9 @@ struct Escape {
   double reached_after_s = 0, error_m = 0;  ///< of the run chosen
 };
 
-/// Rolls out `options.escape_rollouts` random waypoints, `escape_horizon_s` each, at 10 ms a cycle; the first
-/// run that reaches the goal without contact wins.  None does: not found.
+/// Rolls out `options.escape_rollouts` random waypoints, `escape_horizon_s` each, at 10 ms a cycle; of the
+/// runs that reach the goal without contact the quickest wins.  None does: not found.  An arm that is not
+/// stuck and reaches its goal as it goes needs none: not found either.
 Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question);
 
 }  // namespace hamel::planner

@@ -46,6 +46,7 @@ struct Waypoint {
   std::uint64_t asked = 0;       ///< questions asked at this goal so far
   std::uint64_t asked_step = 0;  ///< of the last question
   std::uint64_t waiting = 0;     ///< 1: the last question has no answer yet
+  double asked_s = 0;            ///< sample time of the last question
   double since_s = 0;            ///< on the way since
   std::array<double, kMaxWaypoint> q{};
 };
@@ -86,6 +87,6 @@ struct Memory {
 };
 static_assert(std::is_trivially_copyable_v<Memory>);
 static_assert(sizeof(HeldPair) == 9 * 8 && sizeof(HeldTurn) == 5 * 8);
-static_assert(sizeof(Sighting) == 9 * 8 && sizeof(Waypoint) == (5 + kMaxWaypoint) * 8);
+static_assert(sizeof(Sighting) == 9 * 8 && sizeof(Waypoint) == (6 + kMaxWaypoint) * 8);
 
 }  // namespace hamel::planner

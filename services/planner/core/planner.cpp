@@ -27,6 +27,7 @@ namespace {
 constexpr std::uint64_t kFlips = 2;  // sides tried before an arm that circulates is called stuck
 constexpr double kFade_s = 0.5;      // circulation comes back over it after the barrier was infeasible
 constexpr double kLeastPeriod_s = 1e-6;
+constexpr double kLag_s = 1;  // without progress for so long an arm that moves asks for a quicker way
 constexpr double kNearWaypoint = 0.15, kWaypoint_s = 4;  // a waypoint is passed [rad or m], or given up
 
 }  // namespace
@@ -84,7 +85,8 @@ struct Planner::Impl {
   scene::Goal goal, sought;              // `sought` as it came
   scene::Goal waypoint;                  // as a goal
   Vector3d beyond_W = Vector3d::Zero();  // from where the arm is sent to a target out of reach
-  bool has_goal = false, goal_fits = true, goal_reachable = true, looked = false, asked = false;
+  bool has_goal = false, goal_fits = true, goal_reachable = true, looked = false, asked = false,
+       target_is_blocked = false;
   GoalError goal_error;
   Vector3d target_W = Vector3d::Zero();
   double tip_speed = 0;
@@ -146,6 +148,7 @@ EscapeQuestion Planner::escape_question(const Input& in) const {
   const double goal_age_s = in.t_s - p.memory.goal_start_s;
   EscapeQuestion question{in.step,           in.q,   in.qd,      {},
                           in.obstacle_age_s, p.goal, goal_age_s, p.memory.waypoint.asked};
+  question.stuck = static_cast<State>(p.memory.state) == State::stuck;
   // As the planner sees them: one of unknown velocity goes on with the estimated one.
   Obstacles seen = p.obstacles;
   Memory memory = p.memory;
@@ -276,14 +279,14 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
         joints ? attraction.beyond_limits(arm, goal)
                : (!goal_reachable && !approaching()) ||
                      (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
-    now.target_blocked = !joints && target_blocked(false);
+    now.target_blocked = target_is_blocked = !joints && target_blocked(false);
     const bool rejects = options.method == Method::gyro && options.unreachable == scene::Unreachable::reject;
     refused = now.target_blocked && rejects && goal.V_WG.isZero(0) && target_blocked(true);
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
     const bool rollouts = options.method == Method::gyro && options.escapes > 0;
     const std::uint64_t flips = rollouts ? 1 : kFlips;
-    now.escaping =
-        options.method == Method::gyro && options.kc > 0 && memory.turn_count > 0 && memory.flips < flips;
+    now.escaping = options.method == Method::gyro && options.kc > 0 && memory.flips < flips &&
+                   in.t_s - memory.pressed_s <= kTurnHold_s;
     now.has_rollouts = rollouts;
     if (!pass_waypoint(in))
       verdict = approaching() ? approached(judge(options, memory, now)) : judge(options, memory, now);
@@ -332,13 +335,16 @@ bool Planner::Impl::ask_for_escape(const Input& in, const Verdict& verdict) noex
   Waypoint& w = memory.waypoint;
   const bool curable = verdict.reason == Reason::local_minimum || verdict.reason == Reason::joint_limit ||
                        verdict.reason == Reason::orbit;
-  const bool ask = options.method == Method::gyro && verdict.state == State::stuck && curable && !w.waiting &&
+  const bool lags = verdict.state == State::moving && !w.set && !target_is_blocked &&
+                    in.t_s - std::max(memory.progress_s, w.asked_s) >= kLag_s;
+  const bool ask = options.method == Method::gyro && (curable || lags) && !w.waiting &&
                    w.asked < static_cast<std::uint64_t>(options.escapes) &&
                    arm.n() <= static_cast<int>(kMaxWaypoint);
   if (!ask) return false;
   w.waiting = 1;
   ++w.asked;
   w.asked_step = in.step;
+  w.asked_s = in.t_s;
   return true;
 }
 
