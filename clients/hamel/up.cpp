@@ -35,6 +35,8 @@ class Children final : public runtime::Service {
  public:
   Children(Supervisor& supervisor, Monitor& monitor) : supervisor_(supervisor), monitor_(monitor) {}
   bool poll(runtime::Clock::time_point now) override {
+    if (now < look_) return false;  // not with every message: it asks the kernel for each child
+    look_ = now + 5ms;
     supervisor_.poll(now);
     monitor_.restarts(supervisor_.restarts());
     return false;
@@ -45,6 +47,7 @@ class Children final : public runtime::Service {
  private:
   Supervisor& supervisor_;
   Monitor& monitor_;
+  runtime::Clock::time_point look_{};
 };
 
 std::vector<std::string> command(const std::string& service, const RunArgs& a, const scene::Scene& s,
