@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <thread>
@@ -107,6 +108,11 @@ void Supervisor::end() {
     }
     c.done = true;
   }
+}
+
+bool Supervisor::ended() const {
+  return std::any_of(children_.begin(), children_.end(),
+                     [](const Child& c) { return c.ends_by_itself && c.done; });
 }
 
 int Supervisor::restarts() const {
