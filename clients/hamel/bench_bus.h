@@ -12,6 +12,7 @@ struct BenchBusArgs {
   double rate_hz = 1000;
   std::uint32_t domain = 99;
   bool json = false, check = false;
+  std::string only;    ///< latency, restart, loop or lockstep; empty: all of them
   int cpu = -1;        ///< all processes on this processor; < 0: any
   std::string answer;  ///< not for users: be the other process, over this vendor
 };

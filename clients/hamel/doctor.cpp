@@ -5,6 +5,7 @@
 #include <net/if.h>
 #include <sys/resource.h>
 #include <sys/timex.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -15,6 +16,7 @@
 #include <set>
 
 #include "clients/hamel/run_folder.h"
+#include "common/runtime/realtime.h"
 #include "common/wire/endpoint.h"
 
 namespace hamel::client {
@@ -159,20 +161,26 @@ void look_at_clock(Findings& out) {
                  synchronised ? "" : "timedatectl set-ntp true"});
 }
 
+/// Whether a process of ours would be given it; tried in a child, which ends with it.
+bool given(const runtime::RealtimeOptions& wanted) {
+  const pid_t pid = fork();
+  if (pid == 0) _exit(runtime::go_realtime(wanted).empty() ? 0 : 1);
+  int status = 1;
+  return pid > 0 && waitpid(pid, &status, 0) == pid && status == 0;
+}
+
 void look_at_privileges(Findings& out) {
   rlimit priority{}, memory{};
   getrlimit(RLIMIT_RTPRIO, &priority);
   getrlimit(RLIMIT_MEMLOCK, &memory);
-  const bool root = geteuid() == 0;
-  const bool may = root || priority.rlim_cur > 0;
+  const bool may = given({.priority = 1}), locks = given({.lock_memory = true});
   out.push_back({may ? Verdict::good : Verdict::note, "--priority",
-                 root ? "allowed where the container keeps CAP_SYS_NICE"
-                      : fmt::format("RLIMIT_RTPRIO is {}", priority.rlim_cur),
+                 may ? "tried, and given" : fmt::format("refused; RLIMIT_RTPRIO is {}", priority.rlim_cur),
                  may ? "" : "setcap cap_sys_nice+ep on the programs, or LimitRTPRIO=99 in the unit"});
-  const bool locks = root || memory.rlim_cur == RLIM_INFINITY;
-  out.push_back({locks ? Verdict::good : Verdict::note, "--lock-memory",
-                 locks ? "allowed" : fmt::format("RLIMIT_MEMLOCK is {} kB", memory.rlim_cur / 1024),
-                 locks ? "" : "ulimit -l unlimited as root, or LimitMEMLOCK=infinity in the unit"});
+  out.push_back(
+      {locks ? Verdict::good : Verdict::note, "--lock-memory",
+       locks ? "tried, and given" : fmt::format("refused; RLIMIT_MEMLOCK is {} kB", memory.rlim_cur / 1024),
+       locks ? "" : "ulimit -l unlimited as root, or LimitMEMLOCK=infinity in the unit"});
 }
 
 void look_at_environment(Findings& out) {

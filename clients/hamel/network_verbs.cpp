@@ -32,6 +32,8 @@ void NetworkVerbs::add_bench(CLI::App& app) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   bench_bus_->add_option("--domain", bench_args_.domain, "DDS domain")->capture_default_str();
+  bench_bus_->add_option("--only", bench_args_.only, "this part")
+      ->check(CLI::IsMember({"latency", "restart", "loop", "lockstep"}));
   bench_bus_->add_option("--cpu", bench_args_.cpu, "everything on this processor");
   bench_bus_->add_flag("--json", bench_args_.json, "one JSON object");
   bench_bus_->add_flag("--assert", bench_args_.check,

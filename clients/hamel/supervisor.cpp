@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <thread>
@@ -15,6 +16,7 @@ namespace hamel::client {
 using namespace std::chrono_literals;
 
 namespace {
+constexpr int kQuickRestarts = 3;  // deaths within two seconds of a start that are mended at once
 constexpr int kQuickDeaths = 10;
 constexpr int kBadInputCode = 2;
 }  // namespace
@@ -71,7 +73,7 @@ void Supervisor::died(Child& c, int status, Clock::time_point now) {
     c.done = c.given_up = true;
     return;
   }
-  c.restart_at = now + (c.quick_deaths > 1 ? 500ms : 0ms);
+  c.restart_at = now + (c.quick_deaths > kQuickRestarts ? 500ms : 0ms);
   ++c.restarts;
   spdlog::warn("{} died ({}); starting it again", c.name, how);
 }
@@ -106,6 +108,11 @@ void Supervisor::end() {
     }
     c.done = true;
   }
+}
+
+bool Supervisor::ended() const {
+  return std::any_of(children_.begin(), children_.end(),
+                     [](const Child& c) { return c.ends_by_itself && c.done; });
 }
 
 int Supervisor::restarts() const {

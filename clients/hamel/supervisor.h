@@ -34,6 +34,8 @@ class Supervisor {
   /// SIGTERM to all, SIGKILL to those that are still there after 1.5 s.
   void end();
 
+  /// True when the child that ends by itself has.
+  bool ended() const;
   int restarts() const;
   /// The first child that was given up, if any.
   const Child* failed() const;

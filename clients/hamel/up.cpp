@@ -17,6 +17,7 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr auto kLook = 300ms;
+constexpr auto kLastWords = 2s;  // of dynamics, after it has ended
 
 /// The clock of an arm of this key that runs already; waits a moment, for a match takes one.
 std::optional<wire::SimulationClock> other_arm(bus::Node& node, std::uint32_t arm) {
@@ -35,16 +36,24 @@ class Children final : public runtime::Service {
  public:
   Children(Supervisor& supervisor, Monitor& monitor) : supervisor_(supervisor), monitor_(monitor) {}
   bool poll(runtime::Clock::time_point now) override {
+    if (now < look_) return false;  // not with every message: it asks the kernel for each child
+    look_ = now + 5ms;
     supervisor_.poll(now);
     monitor_.restarts(supervisor_.restarts());
+    if (supervisor_.ended() && ended_ == runtime::Clock::time_point{}) ended_ = now;
+    over_ = ended_ != runtime::Clock::time_point{} && now - ended_ > kLastWords;
     return false;
   }
   runtime::Clock::time_point due() const override { return runtime::Clock::now() + 20ms; }
-  bool finished() const override { return monitor_.finished() || supervisor_.failed() != nullptr; }
+  /// The planner goes on talking when dynamics has ended: its last words may be lost, the others are no
+  /// answer.
+  bool finished() const override { return monitor_.finished() || over_ || supervisor_.failed() != nullptr; }
 
  private:
   Supervisor& supervisor_;
   Monitor& monitor_;
+  runtime::Clock::time_point look_{}, ended_{};
+  bool over_ = false;
 };
 
 std::vector<std::string> command(const std::string& service, const RunArgs& a, const scene::Scene& s,

@@ -34,7 +34,10 @@ struct NodeOptions {
   std::vector<std::string> peers;  ///< unicast addresses; empty: multicast where the interface has it
   std::string name = "hamel";      ///< shown by tools
   std::string discovery_server;    ///< "ADDRESS:PORT" of a Fast DDS discovery server; empty: none
-  std::string security;            ///< folder of an identity made by deploy/security/make; empty: open
+  /// How long wait() stays awake before it sleeps (Cyclone DDS; for those who answer each other as fast as
+  /// they can: it keeps a processor busy).
+  std::chrono::microseconds awake{0};
+  std::string security;  ///< folder of an identity made by deploy/security/make; empty: open
   /// Told in one sentence what a user should know (a peer's QoS that cannot match ours), each once.  Called
   /// by wait(), on the owner's thread; empty: nobody is told.
   std::function<void(const std::string&)> log;

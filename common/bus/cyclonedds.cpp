@@ -93,7 +93,7 @@ using Qos = std::unique_ptr<dds_qos_t, Deleter>;
 
 Listener listener_for(Events& events) {
   Listener l(dds_create_listener(&events));
-  dds_lset_data_available(l.get(), [](dds_entity_t, void* arg) { events_of(arg).inbound.notifier.notify(); });
+  dds_lset_data_available(l.get(), [](dds_entity_t, void* arg) { events_of(arg).arrived(); });
   dds_lset_subscription_matched(l.get(),
                                 [](dds_entity_t, dds_subscription_matched_status_t status, void* arg) {
                                   events_of(arg).matched = static_cast<int>(status.current_count);
@@ -180,6 +180,7 @@ class CycloneReader final : public Reader {
   }
 
   bool take(Payload& payload) override {
+    if (!events_.waits.exchange(false)) return false;
     ddsi_serdata* data = nullptr;
     dds_sample_info_t info;
     while (dds_takecdr(reader_, &data, 1, &info, DDS_ANY_STATE) == 1) {
@@ -187,7 +188,9 @@ class CycloneReader final : public Reader {
       disposed_ += !info.valid_data;
       ddsi_serdata_unref(data);
       from_ = info.publication_handle;
-      if (good) return true;
+      if (!good) continue;
+      events_.waits = true;  // more, perhaps
+      return true;
     }
     return false;
   }
@@ -323,7 +326,7 @@ class CycloneNode final : public Node {
   }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
-    return inbound_.wait(deadline, [this](const Disagreement& d) {
+    return inbound_.wait(deadline, options_.awake, [this](const Disagreement& d) {
       if (options_.log) options_.log(incompatible_sentence(d, Vendor::cyclonedds, endpoints()));
     });
   }

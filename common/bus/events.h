@@ -31,8 +31,8 @@ class Inbound {
 
   /// Waits as Node::wait() does, then tells what is untold to `tell(Disagreement)`.
   template <class Tell>
-  bool wait(std::chrono::steady_clock::time_point deadline, Tell tell) {
-    const bool woken = notifier.wait(deadline);
+  bool wait(std::chrono::steady_clock::time_point deadline, std::chrono::microseconds awake, Tell tell) {
+    const bool woken = notifier.wait(deadline, awake);
     if (!any_.exchange(false)) return woken;
     std::vector<Disagreement> untold;
     {
@@ -59,6 +59,11 @@ struct Events {
     incompatible += static_cast<std::uint64_t>(std::max(change, 0));
     inbound.count(change);
   }
+  /// Something came for this reader; called by vendors' threads.
+  void arrived() noexcept {
+    waits = true;
+    inbound.notifier.notify();
+  }
   static void add(std::atomic<std::uint64_t>& counter, std::int32_t change) {
     counter += static_cast<std::uint64_t>(std::max(change, 0));
   }
@@ -72,6 +77,7 @@ struct Events {
   std::atomic<int> matched{0};
   std::atomic<std::uint64_t> incompatible{0}, lost{0}, late{0}, silent{0};
   std::atomic<bool> said{false};
+  std::atomic<bool> waits{true};  ///< there may be something to take: asking the vendor is dear
 };
 
 }  // namespace hamel::bus

@@ -37,7 +37,7 @@ struct WriterEvents final : Events, dds::DataWriterListener {
 
 struct ReaderEvents final : Events, dds::DataReaderListener {
   using Events::Events;
-  void on_data_available(dds::DataReader*) override { inbound.notifier.notify(); }
+  void on_data_available(dds::DataReader*) override { arrived(); }
   void on_subscription_matched(dds::DataReader*, const dds::SubscriptionMatchedStatus& status) override {
     matched = status.current_count;
   }

@@ -123,6 +123,7 @@ Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const
   n.discovery_server = o.discovery_server;
   n.security = identity_of(o.security, name);
   n.name = name;
+  n.awake = o.awake;
   n.log = [](const std::string& sentence) { spdlog::warn("{}", sentence); };
   return bus::open(n);
 }

@@ -27,8 +27,9 @@ struct BusOptions {
   std::uint32_t domain = bus::NodeOptions{}.domain;
   std::string interface_name;
   std::vector<std::string> peers;
-  std::string discovery_server;  ///< Fast DDS only
-  std::string security;          ///< folder of an identity
+  std::string discovery_server;        ///< Fast DDS only
+  std::string security;                ///< folder of an identity
+  std::chrono::microseconds awake{0};  ///< bus::NodeOptions::awake; no option sets it
 };
 
 /// Options of a run of a scene.

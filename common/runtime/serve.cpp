@@ -82,6 +82,8 @@ int run_program(const Program& p, int argc, char** argv) {
   // Before the middleware starts its threads, so that they inherit it.
   if (const auto problems = go_realtime(o.realtime_options); !problems.empty())
     return complain(p.name, problems);
+  // In lockstep the others answer at once: asleep, a processor takes longer to wake than they to answer.
+  if (pace(o, scene::Pace::realtime) == scene::Pace::lockstep) o.bus.awake = kLockstepAwake;
   auto node = open_node(o.bus, scenes.value()[0].bus.*p.vendor, p.name);
   if (!node) return complain(p.name, {node.error()});
 

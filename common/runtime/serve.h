@@ -10,6 +10,9 @@
 
 namespace hamel::runtime {
 
+/// How long the node of a service in lockstep stays awake for the answer (bus::NodeOptions::awake).
+inline constexpr std::chrono::microseconds kLockstepAwake{50};
+
 struct Program {
   std::string name;                             ///< "hamel-planner"
   std::string what;                             ///< one sentence for --help

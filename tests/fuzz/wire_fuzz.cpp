@@ -1,5 +1,5 @@
-// libFuzzer's entry:  cmake --preset fuzz && ninja -C build/fuzz wire_fuzz && build/fuzz/tests/fuzz/wire_fuzz
-// CORPUS A corpus to begin with: build/release/tests/fuzz/wire_fuzz_test --corpus CORPUS
+// libFuzzer's entry: tests/fuzz/run 300 wire_fuzz
+
 #include <cstdio>
 #include <cstdlib>
 

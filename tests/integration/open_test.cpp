@@ -5,6 +5,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
 #include "common/bus/bus.h"
 
 namespace hamel {
@@ -66,13 +70,56 @@ TEST_P(Open, SaysThatNoParticipantIndexIsFree) {
   for (std::size_t i = 0; i + 1 < sockets.size(); ++i) close(sockets[i]);
 }
 
-TEST_P(Open, OpensAndClosesAgainAndAgain) {
-  for (int i = 0; i < 100; ++i) {
-    auto node = bus::open(options(232));  // the one with the fewest ports to spare
-    ASSERT_TRUE(node) << to_string(node.error());
-    const auto reader = node.value()->reader(topics::kState);
-    const auto writer = node.value()->writer(topics::kState);
+/// What a process holds that outlives nothing: open files, threads, shared memory; and its memory [kB].
+struct Holdings {
+  std::size_t files = 0, threads = 0, segments = 0;
+  long resident_kB = 0;
+
+  static std::size_t entries(const char* folder, const char* with = "") {
+    std::size_t n = 0;
+    for (const auto& e : std::filesystem::directory_iterator(folder))
+      n += e.path().filename().string().find(with) != std::string::npos;
+    return n;
   }
+  static Holdings now() {
+    Holdings h{entries("/proc/self/fd"), entries("/proc/self/task"), entries("/dev/shm", "fast"), 0};
+    std::ifstream statm("/proc/self/statm");
+    long pages = 0;
+    statm >> pages >> pages;
+    h.resident_kB = pages * (sysconf(_SC_PAGESIZE) / 1024);
+    return h;
+  }
+};
+
+// 1000 times with HAMEL_SOAK=1.  Two nodes that meet: each also sees the other come and go.
+TEST_P(Open, AgainAndAgainLeavesNoFileThreadOrSegment) {
+  const char* soak = std::getenv("HAMEL_SOAK");
+  const int cycles = soak != nullptr && *soak == '1' ? 1000 : 20, warm_up = 10;
+  const auto cycle = [&] {
+    auto here = bus::open(options(232)), there = bus::open(options(232));  // few ports to spare
+    ASSERT_TRUE(here && there);
+    const auto reader = here.value()->reader(topics::kState);
+    const auto writer = there.value()->writer(topics::kState);
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    bus::Payload p(400);
+    p[1] = std::byte{1};
+    while (!reader->take(p) && std::chrono::steady_clock::now() < deadline) {
+      writer->write(p);
+      here.value()->wait(std::chrono::steady_clock::now() + std::chrono::milliseconds(1));
+    }
+    EXPECT_EQ(reader->counters().samples, 1u);
+  };
+  for (int i = 0; i < warm_up; ++i) cycle();
+  const Holdings before = Holdings::now();
+  for (int i = 0; i < cycles && !HasFailure(); ++i) cycle();
+  const Holdings after = Holdings::now();
+  EXPECT_EQ(after.files, before.files);
+  EXPECT_EQ(after.threads, before.threads);
+  EXPECT_EQ(after.segments, before.segments);
+  const long grown_kB = after.resident_kB - before.resident_kB;
+  std::printf("%s: %d cycles; %zu files, %zu threads, %zu segments as before; %ld kB more\n",
+              to_string(GetParam()), cycles, after.files, after.threads, after.segments, grown_kB);
+  EXPECT_LT(grown_kB, 4096 + 4 * cycles);
 }
 
 INSTANTIATE_TEST_SUITE_P(Vendors, Open, testing::Values(Vendor::fastdds, Vendor::cyclonedds),

@@ -2,23 +2,22 @@
 /// process of its own: it answers every sample of the state topic with one on the command topic.
 
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <cstring>
 
-#include "common/bus/bus.h"
+#include "clients/hamel/bench_ping.h"
 
 namespace hamel {
 namespace {
 
 using bus::Payload;
 using bus::Vendor;
+using client::ping::Child;
+using client::ping::Clock;
+using client::ping::open;
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
 
 constexpr auto kDeadline = 20s;
 
@@ -28,15 +27,6 @@ Payload sample(std::uint32_t number, std::size_t size) {
   p[4] = std::byte{7};
   std::memcpy(p.data() + 8, &number, 4);
   return p;
-}
-
-std::unique_ptr<bus::Node> open(Vendor vendor, std::uint32_t domain) {
-  bus::NodeOptions options;
-  options.vendor = vendor;
-  options.domain = domain;
-  auto node = bus::open(options);
-  if (!node) throw std::runtime_error(to_string(node.error()));
-  return std::move(node).value();
 }
 
 /// The peer's whole life.
@@ -53,22 +43,9 @@ std::unique_ptr<bus::Node> open(Vendor vendor, std::uint32_t domain) {
   }
 }
 
-struct Peer {
-  Peer(Vendor vendor, std::uint32_t domain) : pid(fork()) {
-    if (pid != 0) return;
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    execl("/proc/self/exe", "peer", to_string(vendor), std::to_string(domain).c_str(), nullptr);
-    _exit(1);
-  }
-  ~Peer() { end(); }
-  void end() {
-    if (pid <= 0) return;
-    kill(pid, SIGKILL);
-    waitpid(pid, nullptr, 0);
-    pid = 0;
-  }
-  pid_t pid;
-};
+auto peer(Vendor vendor, std::uint32_t domain) {
+  return [=] { execl("/proc/self/exe", "peer", to_string(vendor), std::to_string(domain).c_str(), nullptr); };
+}
 
 struct Pair {
   Vendor here, there;
@@ -101,9 +78,9 @@ TEST_P(Process, StoppedOneBlocksNobodyAndIsBackWhenItContinues) {
   const auto node = open(here, domain);
   const auto writer = node->writer(topics::kState), large = node->writer(topics::kObstacles);
   const auto reader = node->reader(topics::kCommand);
-  Peer peer(there, domain);
+  const Child other(peer(there, domain));
   ASSERT_TRUE(answered(*node, *writer, *reader));
-  kill(peer.pid, SIGSTOP);
+  kill(other.pid(), SIGSTOP);
   auto longest = Clock::duration::zero();
   for (std::uint32_t i = 0; i < 5000; ++i) {
     const auto began = Clock::now();
@@ -112,7 +89,7 @@ TEST_P(Process, StoppedOneBlocksNobodyAndIsBackWhenItContinues) {
     longest = std::max(longest, Clock::now() - began);
   }
   EXPECT_LT(longest, 1s) << "a write waited for a reader that stands still";
-  kill(peer.pid, SIGCONT);
+  kill(other.pid(), SIGCONT);
   EXPECT_TRUE(answered(*node, *writer, *reader));
 }
 
@@ -122,7 +99,7 @@ TEST_P(Process, KilledOneIsMissedAndItsSuccessorFound) {
   const auto writer = node->writer(topics::kState);
   const auto reader = node->reader(topics::kCommand);
   for (int life = 0; life < 3; ++life) {
-    Peer peer(there, domain + 1);
+    const Child other(peer(there, domain + 1));
     ASSERT_TRUE(answered(*node, *writer, *reader)) << "life " << life;
   }
   const auto deadline = Clock::now() + kDeadline;

@@ -280,6 +280,22 @@ class Alone(unittest.TestCase):
         self.assertIn("takes arm 1 over", err)
 
 
+class LastWords(unittest.TestCase):
+    def test_a_run_whose_end_was_not_heard_ends_all_the_same(self):
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copy(BIN / "hamel", folder)  # it starts what stands beside it
+            for service in ("planner", "perception"):
+                os.symlink(BIN / f"hamel-{service}", os.path.join(folder, f"hamel-{service}"))
+            silent = os.path.join(folder, "hamel-dynamics")
+            with open(silent, "w") as f:
+                f.write("#!/bin/sh\nexit 0\n")
+            os.chmod(silent, 0o755)
+            done = subprocess.run([os.path.join(folder, "hamel"), "up", scene("four_link_avoid"), "--domain", "85", "--json"],
+                                  capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["outcome"], "NO_DATA")
+
+
 class Leftovers(unittest.TestCase):
     def test_the_folder_of_a_killed_run_is_gone_with_the_next_start(self):
         def folders():
