@@ -82,7 +82,7 @@ struct PlannerOptions {
   double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
   double assumed_speed_mps =
       0;                        ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
-  int escapes = 4;              ///< gyro: ways out looked for by rollouts while stuck at one goal, 0: none
+  int escapes = 8;              ///< gyro: ways out looked for by rollouts at one goal, 0: none
   int escape_rollouts = 16;     ///< waypoints tried for one way out, >= 1
   double escape_horizon_s = 8;  ///< how far ahead a rollout looks, > 0
   double escape_delay_s = 0.2;  ///< the answer enters so long after the question, >= 0
