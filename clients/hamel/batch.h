@@ -1,6 +1,6 @@
 #pragma once
-/// Many independent jobs on several threads, their results handed over in the order of the jobs: the outcome
-/// does not depend on how many threads there are.
+/// What `hamel batch`, `bench planner` and `trade` run on: many independent jobs on several threads, their
+/// results handed over in the order of the jobs: the outcome does not depend on how many threads there are.
 
 #include <algorithm>
 #include <atomic>
@@ -22,6 +22,11 @@ struct Batch {
   std::function<bool()> stop = {};  ///< asked before each job, from any thread; true: start no more
   std::function<void(std::size_t)> progress = {};  ///< results taken so far, on the caller's thread
 };
+
+/// `asked`, or one for each core where that is 0.
+inline int workers(int asked) {
+  return asked > 0 ? asked : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
 
 /// Calls work(i) for i = 0, 1, ... on the batch's threads and take(i, result) in that order on the caller's.
 ///

@@ -1,16 +1,15 @@
 #include "clients/hamel/batch_verb.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <map>
-#include <thread>
 
 #include "clients/hamel/batch.h"
 #include "clients/hamel/chosen.h"
 #include "clients/hamel/journal.h"
+#include "clients/hamel/progress.h"
 #include "clients/hamel/variations.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
@@ -102,21 +101,6 @@ Checked<Variations> load_variations(const std::string& path) {
   return Variations(std::move(text).value());
 }
 
-class Progress {
- public:
-  explicit Progress(std::size_t jobs) : jobs_(jobs) {}
-  void say(std::size_t done) {
-    if (on_) fmt::print(stderr, "\r\033[K{}/{}", done, jobs_), std::fflush(stderr);
-  }
-  ~Progress() {
-    if (on_) fmt::print(stderr, "\r\033[K");
-  }
-
- private:
-  const std::size_t jobs_;
-  const bool on_ = isatty(STDERR_FILENO) == 1;
-};
-
 /// One variation as a row; a scene that is not valid ends the batch with its problems.
 struct Done {
   std::string row;
@@ -177,10 +161,9 @@ int batch(const BatchArgs& args) {
   std::atomic<bool> failed{false};
   std::size_t done = begun;
   {
-    Progress progress(v.size());
-    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    Progress progress(v.size(), "variations");
     const Batch jobs{.jobs = v.size() - begun,
-                     .workers = args.workers > 0 ? args.workers : cores,
+                     .workers = workers(args.workers),
                      .stop = [&] { return stop.requested() || failed; },
                      .progress = [&](std::size_t k) { progress.say(begun + k); }};
     run_batch(

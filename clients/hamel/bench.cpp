@@ -1,19 +1,18 @@
 #include "clients/hamel/bench.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "clients/hamel/batch.h"
 #include "clients/hamel/bench_output.h"
 #include "clients/hamel/bench_streams.h"
 #include "clients/hamel/gnuplot.h"
 #include "clients/hamel/problems.h"
+#include "clients/hamel/progress.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
@@ -24,33 +23,6 @@ namespace hamel::client {
 namespace {
 
 using scene::Method;
-
-/// One line on stderr: overwritten on a terminal, else a line each ten seconds.
-class Progress {
- public:
-  explicit Progress(std::size_t of) : of_(of) {}
-  ~Progress() {
-    if (terminal_ && shown_) fmt::print(stderr, "\r\033[K");
-  }
-  void say(std::size_t done, const std::string& what) {
-    const double now = now_s(), passed = now - began_;
-    if (done < of_ && now - last_ < (terminal_ ? 0.2 : 10.0)) return;
-    last_ = now;
-    shown_ = true;
-    const double rate = passed > 0 ? static_cast<double>(done) / passed : 0;
-    const double left = rate > 0 ? static_cast<double>(of_ - done) / rate : 0;
-    fmt::print(stderr, "{}{}/{} scenes, {:.1f} a second, {:.0f} s to go: {}{}", terminal_ ? "\r\033[K" : "",
-               done, of_, rate, left, what, terminal_ ? "" : "\n");
-    std::fflush(stderr);
-  }
-
- private:
-  const bool terminal_ = isatty(STDERR_FILENO) == 1;
-  const std::size_t of_;
-  const double began_ = now_s();
-  double last_ = began_;
-  bool shown_ = false;
-};
 
 /// Everything that is decided before the first trial.
 struct Plan {
@@ -187,11 +159,10 @@ int bench_planner(const BenchArgs& args) {
     all.push_back({cell, plan.method_names, std::vector<Tally>(plan.methods.size())});
   bool interrupted = false;
   {
-    Progress progress(plan.jobs.size());
+    Progress progress(plan.jobs.size(), "scenes");
     const auto asked = [&stop] { return stop.requested(); };
     Batch batch{.jobs = plan.jobs.size()};
-    batch.workers =
-        args.jobs > 0 ? args.jobs : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    batch.workers = workers(args.jobs);
     batch.stop = asked;
     batch.progress = [&](std::size_t done) {
       progress.say(done, label(plan.cells[plan.jobs[done - 1].first]));

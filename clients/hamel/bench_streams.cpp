@@ -8,10 +8,10 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "clients/hamel/batch.h"
 #include "clients/hamel/bench_families.h"
+#include "clients/hamel/progress.h"
 #include "clients/hamel/trial.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/options.h"
@@ -195,10 +195,10 @@ int bench_streams(const BenchArgs& args, const std::function<bool()>& stop) {
       for (const bool empty : {false, true}) jobs.push_back({r, m, empty});
   std::vector<Row> rows;
   Batch batch{.jobs = jobs.size()};
-  batch.workers =
-      args.jobs > 0 ? args.jobs : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  batch.workers = workers(args.jobs);
   batch.stop = stop;
-  batch.progress = [&](std::size_t done) { fmt::print(stderr, "{}/{} runs\n", done, jobs.size()); };
+  Progress progress(jobs.size(), "runs");
+  batch.progress = [&](std::size_t done) { progress.say(done); };
   run_batch(
       batch,
       [&](std::size_t i) {

@@ -1,7 +1,8 @@
 #include "clients/hamel/choose.h"
 
+#include <time.h>
+
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "clients/hamel/ticks.h"
@@ -18,7 +19,6 @@ using trade::kSamples;
 constexpr int kHalvings = 5;         // of a steered reference's step
 constexpr double kBetween = 2;       // an error between two instants, of the largest at one
 constexpr double kRounding = 1e-13;  // what a run adds up to [rad or m], at the least
-constexpr double kCycle_us = 12;     // one planner cycle
 constexpr double kShortRun_s = 0.05;
 
 /// What an evaluation usually takes [us]: a fixed part and one for each joint, measured on one core.
@@ -34,6 +34,13 @@ double evaluation_us(const scene::Scene& s, const scene::DynamicsOptions& o) {
     default:
       return 0.05 + (flat ? 0.05 : 0.11) * n;
   }
+}
+
+/// What a planner cycle usually takes [us], with so many pairs of link and obstacle in range.
+double cycle_us(const scene::Scene& s, double pairs) {
+  const double n = s.robot.chain.n();
+  const bool gyro = s.planner.method == scene::Method::gyro;
+  return gyro ? 0.6 * n + 0.1 * n * n + 0.5 * pairs : 0.5 * n + 0.3 * pairs;
 }
 
 double horizon_of(const scene::Scene& s) {
@@ -57,7 +64,7 @@ Path follow(const scene::Scene& s, double horizon_s, const trade::Watch& watch) 
   Path path;
   path.setting = {.dynamics = s.dynamics, .period_steps = s.planner.period_steps};
   Ticks ticks(s);
-  double evaluations = 0;
+  double evaluations = 0, pairs = 0, steps = 0;
   const auto per_instant = steps_an_instant(horizon_s, s.dynamics.dt_s);
   const double began = watch.now_s();
   for (int k = 0; k < kSamples; ++k) {
@@ -66,6 +73,8 @@ Path follow(const scene::Scene& s, double horizon_s, const trade::Watch& watch) 
       ticks.plan();
       if (!ticks.step() || ticks.arm().report().substeps > 1) return path;
       evaluations += ticks.arm().report().evaluations;
+      pairs += ticks.report().pairs_in_range;
+      ++steps;
     }
     path.q.push_back(ticks.arm().state().q);
   }
@@ -73,7 +82,8 @@ Path follow(const scene::Scene& s, double horizon_s, const trade::Watch& watch) 
   const double cycles = s.steered ? 1 / (s.planner.period_steps * s.dynamics.dt_s) : 0;
   path.setting.finished = true;
   path.setting.seconds_per_s = (watch.now_s() - began) / t_s;
-  path.setting.work_per_s = evaluations / t_s * evaluation_us(s, s.dynamics) + cycles * kCycle_us;
+  path.setting.work_per_s =
+      evaluations / t_s * evaluation_us(s, s.dynamics) + cycles * cycle_us(s, pairs / steps);
   path.setting.energy_error = ticks.arm().energy_drift_rel();
   path.end = ticks.report().state;
   path.contacts = ticks.report().contacts;
@@ -117,30 +127,34 @@ Converged converge_free(const scene::Scene& s, const trade::Watch& watch) {
   return {std::move(r.q), motion.horizon_s, whole ? r.uncertainty : scene::kInf, r.dt_s};
 }
 
-/// Tiers and steps worth a try; the planner looks at every step.
-std::vector<scene::DynamicsOptions> candidates(const scene::Scene& s) {
+/// A way to run a scene.
+struct Candidate {
+  scene::DynamicsOptions dynamics;
+  int period_steps = 1;
+};
+
+/// Tiers and steps worth a try, a planner cycle each step; steps as short as written, cycles seldomer.
+std::vector<Candidate> candidates(const scene::Scene& s) {
   const double horizon_s = horizon_of(s);
+  std::vector<Candidate> out;
   if (!s.steered) {
     const trade::Motion motion{
         .chain = s.robot.chain, .q0 = s.q0, .qd0 = s.qd0, .horizon_s = horizon_s, .base = s.dynamics};
-    return trade::candidates(motion, true);
+    for (const scene::DynamicsOptions& o : trade::candidates(motion, true)) out.push_back({o, 1});
+    return out;
   }
-  std::vector<scene::DynamicsOptions> out;
+  const auto add = [&](Tier tier, double times, int period_steps) {
+    scene::DynamicsOptions o = s.dynamics;
+    o.tier = tier;
+    o.tolerance_Nm = 0;
+    o.dt_s = trade::fitting_step(times * s.dynamics.dt_s, horizon_s);
+    out.push_back({o, period_steps});
+  };
   for (const Tier tier : {Tier::midpoint, Tier::semi_implicit_euler, Tier::rk4})
-    for (const double times : {0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0}) {
-      scene::DynamicsOptions o = s.dynamics;
-      o.tier = tier;
-      o.tolerance_Nm = 0;
-      o.dt_s = trade::fitting_step(times * s.dynamics.dt_s, horizon_s);
-      out.push_back(o);
-    }
-  return out;
-}
-
-scene::Scene with(const scene::Scene& s, const scene::DynamicsOptions& o) {
-  scene::Scene out = s;
-  out.dynamics = o;
-  out.planner.period_steps = 1;
+    for (const double times : {0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0})
+      add(tier, times, 1);
+  for (const Tier tier : {Tier::midpoint, Tier::semi_implicit_euler})
+    for (const int period : {2, 3, 4, 5, 8}) add(tier, 1, period);
   return out;
 }
 
@@ -148,10 +162,18 @@ scene::Scene with(const scene::Scene& s, const scene::DynamicsOptions& o) {
 
 trade::Watch steady_watch() {
   return {[] {
-            const auto now = std::chrono::steady_clock::now().time_since_epoch();
-            return std::chrono::duration<double>(now).count();
+            timespec t{};
+            clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+            return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
           },
           [] { return false; }};
+}
+
+scene::Scene with(const scene::Scene& s, const scene::DynamicsOptions& o, int period_steps) {
+  scene::Scene out = s;
+  out.dynamics = o;
+  out.planner.period_steps = period_steps;
+  return out;
 }
 
 Converged converge(const scene::Scene& s, const trade::Watch& watch) {
@@ -183,9 +205,9 @@ Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
   Choosing out;
   out.reference = converge(s, watch);
   if (!(out.reference.uncertainty <= 0.2 * s.accuracy.joint_error_rad)) return out;
-  for (const scene::DynamicsOptions& o : candidates(s)) {
+  for (const Candidate& c : candidates(s)) {
     if (watch.stop()) return out;
-    out.tried.push_back(measure(with(s, o), out.reference, watch));
+    out.tried.push_back(measure(with(s, c.dynamics, c.period_steps), out.reference, watch));
     const Setting& now = out.tried.back();
     if (meets(s.accuracy, now, out.reference) && (!out.chosen || now.work_per_s < out.chosen->work_per_s))
       out.chosen = now;
@@ -196,10 +218,16 @@ Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
 void apply(const Choosing& c, scene::Scene& s) {
   const Setting& setting = *c.chosen;
   for (scene::Reduction& r : s.reductions) {
+    if (r.name == "cycle" && r.in_force) {
+      r.in_force = false;
+      r.why = "the step was chosen, and the planner's period with it";
+      r.after = 1 / (setting.period_steps * setting.dynamics.dt_s);
+    }
     if (r.name != "step") continue;
     r.in_force = true;
-    r.what = trade::label(setting.dynamics) + ", a planner cycle each step";
-    if (!s.steered) r.what = trade::label(setting.dynamics);
+    r.what = trade::label(setting.dynamics);
+    if (s.steered)
+      r.what += ", a planner cycle each " + text(setting.period_steps * setting.dynamics.dt_s) + " s";
     r.why = "measured against the converged motion, the cheapest that keeps to the accuracy";
     r.after = setting.dynamics.dt_s;
     r.bound = error_bound(setting, c.reference);

@@ -19,7 +19,7 @@ struct Setting {
   bool same_end = true;      ///< steered: ends in the reference's state, without contact where it has none
   double joint_error = 0;    ///< largest |q - q_ref| at 20 instants of the horizon [rad or m]
   double energy_error = 0;   ///< over the energy scale
-  double seconds_per_s = 0;  ///< wall time of a simulated second, ticks alone
+  double seconds_per_s = 0;  ///< CPU time of a simulated second, ticks alone
   double work_per_s = 0;     ///< what the choice goes by: counted, not timed [us]
 };
 
@@ -37,12 +37,14 @@ struct Choosing {
   std::optional<Setting> chosen;  ///< none: nothing tried meets the accuracy
 };
 
+/// The scene by another tier, step and planner period.
+scene::Scene with(const scene::Scene& scene, const scene::DynamicsOptions& dynamics, int period_steps);
 Converged converge(const scene::Scene& scene, const trade::Watch& watch);
 Setting measure(const scene::Scene& scene, const Converged& reference, const trade::Watch& watch);
 
-/// Runs the scene by many tiers and steps.  The choice counts evaluations and planner cycles, each with the
-/// time it usually takes, so that it is the same on every machine and in every process; wall times stand
-/// beside it.
+/// Runs the scene by many tiers, steps and planner periods.  The choice counts evaluations and planner
+/// cycles, each with the time it usually takes, so that it is the same on every machine and in every process;
+/// wall times stand beside it.
 Choosing choose(const scene::Scene& scene, const trade::Watch& watch);
 /// What no joint is off by at any time of the horizon: twice what was measured at the instants, for what lies
 /// between them, and the reference's own uncertainty [rad or m].
@@ -53,7 +55,7 @@ bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& refe
 void apply(const Choosing& c, scene::Scene& scene);
 /// The same as overrides: "dynamics.tier=gauss" and so on.
 std::vector<std::string> overrides(const Setting& s);
-/// The clock, and no early end.
+/// The CPU time of the calling thread, so that what else the machine does is not counted, and no early end.
 trade::Watch steady_watch();
 
 }  // namespace hamel::client

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/hamel/explain_cost.h"
+#include "clients/hamel/explain_table.h"
 #include "common/files/scene_text.h"
-#include "common/rbd/planar_chain.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
 #include "common/scene/reduce.h"
@@ -17,10 +17,6 @@ namespace hamel::client {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-const char* space_of(const scene::Scene& s) {
-  return s.dynamics.space == scene::Space::automatic && rbd::is_planar(s.robot.chain) ? "SE2" : "SE3";
-}
 
 std::string quantity(double v, const std::string& unit) {
   return unit.empty() ? "" : fmt::format("{:.6g}", v);
@@ -32,6 +28,13 @@ const scene::Reduction* find(const scene::Scene& s, const std::string& name) {
   return nullptr;
 }
 
+/// The error of a bounded reduction that is in force.
+double measured(const Explained& e, const std::string& name) {
+  for (const MeasuredError& m : e.errors)
+    if (m.name == name) return m.error_m;
+  return e.choosing && e.choosing->chosen ? e.choosing->chosen->joint_error : 0;
+}
+
 void print_reductions(const Explained& e) {
   fmt::print("\n  {:<10} {:<8} {:>10} {:>10}  {:<20} {}\n", "", "kind", "before", "after", "",
              "what, and why");
@@ -40,7 +43,9 @@ void print_reductions(const Explained& e) {
                r.exact ? "exact" : "bounded", quantity(r.before, r.unit), quantity(r.after, r.unit), r.unit,
                r.what);
     fmt::print("  {:<64}  {}\n", "", r.why);
-    if (!r.exact && r.in_force) fmt::print("  {:<64}  bound {:.3g} {}\n", "", r.bound, r.bound_unit);
+    if (!r.exact && r.in_force)
+      fmt::print("  {:<64}  bound {:.3g} {}, measured {:.3g}\n", "", r.bound, r.bound_unit,
+                 measured(e, r.name));
   }
   fmt::print("* in force.  Fidelity {}.\n", scene::to_string(e.reduced.reduce.fidelity));
 }
@@ -109,51 +114,14 @@ Json json_of(const Explained& e) {
     if (!r.unit.empty()) one["before"] = r.before, one["after"] = r.after, one["unit"] = r.unit;
     j["reductions"].push_back(one);
     if (!r.exact && r.in_force)
-      j["bounds"].push_back({{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}});
+      j["bounds"].push_back(
+          {{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}, {"measured", measured(e, r.name)}});
   }
   j["cost_per_step"] = {{"full", json_of(e.full_cost)}, {"reduced", json_of(e.reduced_cost)}};
   for (const ReductionCost& r : e.each) j["cost_per_step"]["without " + r.name] = json_of(r.without);
   j["measured_error"] =
       e.choosing && e.choosing->chosen ? e.choosing->chosen->joint_error : e.reduced_cost.joint_error;
   return j;
-}
-
-/// A row of the table, e.g. "| three_link_swing | full | midpoint, 0.01 s | 1.2e-3 | ... |".
-std::string row(const scene::Scene& s, const std::string& name, const Setting& m) {
-  return fmt::format("| {} | {} | {} {:.4g} ms | {} | {:.1e} | {:.1e} | {:.3g} | {:.4g} |\n", s.name, name,
-                     trade::label(m.dynamics), 1e3 * m.dynamics.dt_s, space_of(s), m.joint_error,
-                     m.energy_error, 1e6 * m.seconds_per_s, 1 / m.seconds_per_s);
-}
-
-bool print_rows(const scene::Scene& written, const trade::Watch& watch) {
-  const auto as = [&](scene::Fidelity fidelity) {
-    scene::Scene s = written;
-    s.reduce = {.fidelity = fidelity};
-    scene::reduce(s);
-    return s;
-  };
-  scene::Scene full = as(scene::Fidelity::full), exact = as(scene::Fidelity::exact),
-               fastest = as(scene::Fidelity::fastest);
-  const Choosing c = choose(fastest, watch);
-  fmt::print("{}", row(full, "full", measure(full, c.reference, watch)));
-  fmt::print("{}", row(exact, "exact (default)", measure(exact, c.reference, watch)));
-  if (c.chosen)
-    fmt::print("{}",
-               row(fastest, fmt::format("fastest within {:g}", written.accuracy.joint_error_rad), *c.chosen));
-  else
-    fmt::print("| {} | fastest | none keeps to {:g}; reference known to {:.1e} | | | | | |\n", written.name,
-               written.accuracy.joint_error_rad, c.reference.uncertainty);
-  std::fflush(stdout);
-  return c.chosen.has_value();
-}
-
-int print_table(const std::vector<scene::Scene>& scenes, const trade::Watch& watch) {
-  fmt::print(
-      "| scene | fidelity | tier, dt | space | joints off by | energy off by | us a simulated second | "
-      "real-time factor |\n|---|---|---|---|---|---|---|---|\n");
-  bool all = true;
-  for (const scene::Scene& s : scenes) all = print_rows(s, watch) && all;
-  return all ? runtime::kDone : runtime::kFailed;
 }
 
 void print_text(const Explained& e) {

@@ -11,7 +11,7 @@ struct ExplainArgs {
   std::vector<std::string> overrides;
   bool json = false;
   bool table = false;    ///< speed against accuracy, a row for each fidelity of each scene (Markdown)
-  double seconds = 0.3;  ///< wall time for each measurement of cost
+  double seconds = 0.3;  ///< CPU time for each measurement of cost
 };
 /// 0; 1 where a table's scene has no setting that keeps to its accuracy; 2 bad input.
 int explain(const ExplainArgs& args);

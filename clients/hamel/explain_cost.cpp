@@ -65,7 +65,12 @@ scene::Choice* choice(scene::ReduceOptions& o, const std::string& name) {
   if (name == "gravity") return &o.gravity;
   if (name == "obstacles") return &o.obstacles;
   if (name == "links") return &o.links;
+  if (name == "self") return &o.self;
+  if (name == "shapes") return &o.shapes;
+  if (name == "merge") return &o.merge;
+  if (name == "requery") return &o.requery;
   if (name == "rate") return &o.rate;
+  if (name == "cycle") return &o.cycle;
   return nullptr;
 }
 
@@ -74,14 +79,60 @@ Variant reduced(scene::Scene s) {
   return {std::move(s), {scene::kInf, scene::kInf, 0}, {}};
 }
 
+/// The exact reductions, with or without this bounded one.
+scene::Scene alone(const scene::Scene& written, const std::string& name, bool with) {
+  scene::Scene s = written;
+  s.reduce = {};
+  *choice(s.reduce, name) = with ? scene::Choice::on : scene::Choice::off;
+  scene::reduce(s);
+  return s;
+}
+
+double bound_of(const scene::Scene& s, const std::string& name) {
+  for (const scene::Reduction& r : s.reductions)
+    if (r.name == name) return r.bound;
+  return 0;
+}
+
+double closed_in(const scene::Scene& s, std::uint64_t steps) {
+  Ticks ticks(s);
+  const double cycle_s = s.planner.period_steps * s.dynamics.dt_s;
+  const double obstacles_m = bound_of(s, "cycle") - s.planner.vmax_mps * cycle_s;
+  double most = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  for (std::uint64_t k = 0; k < steps && !ticks.done(); ++k) {
+    ticks.plan();
+    const Eigen::Vector3d now = ticks.report().end_effector_m;
+    if (k > 0) most = std::max(most, (now - before).norm());
+    before = now;
+    if (!ticks.step()) break;
+  }
+  return most + obstacles_m;
+}
+
 }  // namespace
+
+double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps) {
+  Ticks a(reduced), b(exact);
+  double worst = 0;
+  for (std::uint64_t k = 0; k < steps && !a.done(); ++k) {
+    a.plan();
+    b.plan(a.arm().state(), a.arm().t_s());
+    const auto &x = a.report().links, &y = b.report().links;
+    for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i)
+      if (std::isfinite(y[i].distance_m))
+        worst = std::max(worst, std::abs(x[i].distance_m - y[i].distance_m));
+    if (!a.step()) break;
+  }
+  return worst;
+}
 
 Explained explain_scene(const scene::Scene& written, double seconds, const trade::Watch& watch) {
   scene::Scene full = written;
   full.reduce = {};
   full.reduce.fidelity = scene::Fidelity::full;
   std::vector<Variant> variants{reduced(full), reduced(written)};
-  Explained out{written, variants[0].scene, variants[1].scene, {}, {}, {}, {}};
+  Explained out{written, variants[0].scene, variants[1].scene, {}, {}, {}, {}, {}};
   for (const scene::Reduction& r : out.reduced.reductions) {
     scene::Scene s = written;
     scene::Choice* const c = choice(s.reduce, r.name);
@@ -97,6 +148,12 @@ Explained explain_scene(const scene::Scene& written, double seconds, const trade
   out.full_cost = variants[0].cost;
   out.reduced_cost = variants[1].cost;
   for (std::size_t k = 0; k < out.each.size(); ++k) out.each[k].without = variants[k + 2].cost;
+  for (const scene::Reduction& r : out.reduced.reductions)
+    if (!r.exact && r.in_force && r.name == "cycle")
+      out.errors.push_back({r.name, closed_in(alone(written, r.name, true), 4 * steps)});
+    else if (!r.exact && r.in_force)
+      out.errors.push_back(
+          {r.name, distance_error(alone(written, r.name, true), alone(written, r.name, false), 4 * steps)});
   if (scene::wanted(written.reduce, written.reduce.step, false)) {
     out.choosing = choose(out.reduced, watch);
     if (out.choosing->chosen) apply(*out.choosing, out.reduced);

@@ -10,7 +10,7 @@
 
 namespace hamel::client {
 
-/// Wall time of a step, ticks alone, and how far the joints went from those of full fidelity.
+/// CPU time of a step, ticks alone, and how far the joints went from those of full fidelity.
 struct StepCost {
   double dynamics_us = 0, planner_us = 0;
   double joint_error = 0;  ///< largest |q - q of full fidelity| in the time that was run [rad or m]
@@ -22,14 +22,26 @@ struct ReductionCost {
   StepCost without;  ///< the scene with this reduction forbidden
 };
 
+/// A bounded reduction by itself, over the first steps of the run: the largest distance of a link to its
+/// nearest obstacle that was off (shapes, merge, requery, rate), or the longest way that the end effector and
+/// an obstacle closed in between two cycles (cycle) [m].
+struct MeasuredError {
+  std::string name;
+  double error_m = 0;
+};
+
 struct Explained {
   scene::Scene written, full, reduced;
   StepCost full_cost, reduced_cost;
   std::vector<ReductionCost> each;
-  std::optional<Choosing> choosing;  ///< where the scene leaves tier and step to us
+  std::vector<MeasuredError> errors;  ///< of the bounded ones in force, step apart
+  std::optional<Choosing> choosing;   ///< where the scene leaves tier and step to us
 };
 
-/// Reduces `written` in every way and runs each for about `seconds` of wall time, in turns.
+/// Runs `reduced`, and beside it the planner of `exact` at the same states: by how much the distances that
+/// the links report differ at most [m].
+double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps);
+/// Reduces `written` in every way and runs each for about `seconds` of CPU time, in turns.
 Explained explain_scene(const scene::Scene& written, double seconds, const trade::Watch& watch);
 
 }  // namespace hamel::client

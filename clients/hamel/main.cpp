@@ -199,6 +199,9 @@ CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
       ->check(CLI::IsMember({"time", "evaluations"}))
       ->capture_default_str();
   trade->add_flag("--quick", a.quick, "fewer steps and tolerances");
+  trade->add_option("--jobs", a.jobs, "threads; the times of several at once are worth less")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
   trade->add_option("--csv", a.csv_path, "write every measurement")->type_name("FILE");
   trade->add_option("--plot", a.plot_path, "draw cost against error, .svg or .png (needs gnuplot)")
       ->type_name("FILE");
@@ -230,7 +233,7 @@ CLI::App* add_explain(CLI::App& app, client::ExplainArgs& a) {
       ->add_flag("--table", a.table,
                  "speed against accuracy instead: full, exact and fastest fidelity of each scene, Markdown")
       ->excludes(json);
-  explain->add_option("--seconds", a.seconds, "wall time for each measurement of cost")
+  explain->add_option("--seconds", a.seconds, "CPU time for each measurement of cost")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   return explain;

@@ -15,7 +15,7 @@ constexpr std::uint64_t kNever = ~std::uint64_t{0};
 Ticks::Ticks(const scene::Scene& scene)
     : scene_(scene),
       arm_(scene_),
-      planner_(scene_.robot, scene_.planner),
+      planner_(scene_.robot, scene_.planner, planner::savings(scene_)),
       output_(planner_.output()),
       view_(scene_),
       last_step_(static_cast<std::uint64_t>(std::llround(scene.duration_s / scene.dynamics.dt_s))) {
@@ -26,8 +26,8 @@ Ticks::Ticks(const scene::Scene& scene)
 }
 
 /// Hands over the sets that are due now, as perception does in lockstep.
-void Ticks::look() {
-  const double t_s = arm_.t_s(), period_s = source_->period_s();
+void Ticks::look(double t_s) {
+  const double period_s = source_->period_s();
   while (next_set_ != kNever && static_cast<double>(next_set_) * period_s <= t_s) {
     if (perception::to_wire(*source_, next_set_, next_set_, true, set_)) view_.add(set_);
     const double next_s = source_->next_time(static_cast<double>(next_set_) * period_s);
@@ -37,23 +37,31 @@ void Ticks::look() {
   }
 }
 
-void Ticks::plan() {
-  const dynamics::State& s = arm_.state();
+void Ticks::plan(const dynamics::State& s, double t_s) {
   const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
   if (!scene_.steered || !source_ || s.step % period != 0) return;
-  look();
+  look(t_s);
   causes_.size = 0;
-  const double age_s = view_.at(arm_.t_s(), s.q, causes_);
-  const planner::Input in{.step = s.step,
-                          .t_s = arm_.t_s(),
-                          .dt_s = static_cast<double>(period) * scene_.dynamics.dt_s,
-                          .q = s.q,
-                          .qd = s.qd,
-                          .obstacles = view_.obstacles(),
-                          .obstacle_age_s = age_s,
-                          .obstacles_expected = true,
-                          .link_floor_m = view_.link_floor_m()};
+  const double age_s = view_.at(t_s, s.q, causes_);
+  planner::Input in{.step = s.step,
+                    .t_s = t_s,
+                    .dt_s = static_cast<double>(period) * scene_.dynamics.dt_s,
+                    .q = s.q,
+                    .qd = s.qd,
+                    .obstacles = view_.obstacles(),
+                    .obstacle_age_s = age_s,
+                    .obstacle_set = view_.set(),
+                    .obstacles_expected = true,
+                    .link_floor_m = view_.link_floor_m()};
+  if (escape_due_ && s.step >= *escape_due_) {
+    planner_.take_escape(escape_.waypoint, t_s);
+    escape_due_.reset();
+  }
   planner_.plan(in, output_);
+  if (!output_.report.escape_asked) return;
+  in.obstacles = view_.all();
+  escape_ = planner::find_escape(scene_.robot, scene_.planner, planner_.escape_question(in));
+  escape_due_ = s.step + planner_.escape_steps(scene_.dynamics.dt_s);
 }
 
 bool Ticks::step() {

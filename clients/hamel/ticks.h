@@ -3,11 +3,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "common/scene/scene.h"
 #include "common/wire/messages.h"
 #include "services/dynamics/arm.h"
 #include "services/perception/core/source.h"
+#include "services/planner/core/escape.h"
 #include "services/planner/core/planner.h"
 #include "services/planner/obstacle_view.h"
 
@@ -20,7 +22,9 @@ class Ticks {
   explicit Ticks(const scene::Scene& scene);
 
   /// One planner cycle where one is due.  Does nothing in a free motion.
-  void plan();
+  void plan() { plan(arm_.state(), arm_.t_s()); }
+  /// The same for an arm of this state, whatever ours is.
+  void plan(const dynamics::State& s, double t_s);
   /// One step of the arm.  False where it found no usable step.
   bool step();
   /// True after the scene's duration, or with the goal where the scene ends there.
@@ -31,7 +35,7 @@ class Ticks {
   const Eigen::VectorXd& torque_Nm() const { return output_.torque_Nm; }
 
  private:
-  void look();
+  void look(double t_s);
 
   const scene::Scene& scene_;
   dynamics::Arm arm_;
@@ -39,6 +43,8 @@ class Ticks {
   planner::Output output_;
   planner::ObstacleView view_;
   std::optional<perception::Source> source_;
+  planner::Escape escape_;
+  std::optional<std::uint64_t> escape_due_;  ///< the step at which it enters
   wire::ObstacleSet set_;
   wire::Causes causes_;
   std::uint64_t last_step_ = 0, next_set_ = 0;

@@ -1,7 +1,6 @@
 #include "clients/hamel/trade.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,8 +9,10 @@
 #include <fstream>
 #include <map>
 
+#include "clients/hamel/batch.h"
 #include "clients/hamel/gnuplot.h"
 #include "clients/hamel/motion.h"
+#include "clients/hamel/progress.h"
 #include "clients/hamel/trade_choice.h"
 #include "common/runtime/options.h"
 
@@ -20,18 +21,6 @@ namespace hamel::client {
 namespace {
 
 using trade::Measured;
-
-/// One line on a terminal's stderr, overwritten.
-class Progress {
- public:
-  void say(const std::string& what) {
-    if (on_) fmt::print(stderr, "\r\033[K{}", what), std::fflush(stderr);
-  }
-  ~Progress() { say(""); }
-
- private:
-  const bool on_ = isatty(STDERR_FILENO) == 1;
-};
 
 std::string small(double v) { return std::isfinite(v) ? fmt::format("{:.1e}", v) : "-"; }
 
@@ -159,16 +148,20 @@ int print_recommendation(const TradeArgs& args, const trade::Motion& m, const st
   return runtime::kDone;
 }
 
-/// Every measurement, or what there is of them when told to end.
-std::vector<Measured> measure_all(const trade::Motion& motion, const trade::Reference& reference, bool quick,
-                                  const trade::Watch& watch, Progress& progress) {
+/// Every measurement, or the first of them when told to end.  One after the other unless asked otherwise:
+/// their times count.
+std::vector<Measured> measure_all(const TradeArgs& args, const trade::Motion& motion,
+                                  const trade::Reference& reference, const trade::Watch& watch) {
   std::vector<Measured> all;
-  const auto candidates = trade::candidates(motion, quick);
-  for (std::size_t i = 0; i < candidates.size() && !watch.stop(); ++i) {
-    progress.say(fmt::format("{}/{} {} dt {:.4g} s", i + 1, candidates.size(), trade::label(candidates[i]),
-                             candidates[i].dt_s));
-    all.push_back(trade::measure(motion, candidates[i], reference, watch));
-  }
+  const auto candidates = trade::candidates(motion, args.quick);
+  Progress progress(candidates.size(), "methods and steps");
+  const Batch batch{
+      .jobs = candidates.size(), .workers = args.jobs, .stop = watch.stop, .progress = [&](std::size_t k) {
+        progress.say(k, trade::label(candidates[k - 1]));
+      }};
+  run_batch(
+      batch, [&](std::size_t i) { return trade::measure(motion, candidates[i], reference, watch); },
+      [&](std::size_t, Measured m) { all.push_back(std::move(m)); });
   return all;
 }
 
@@ -183,14 +176,8 @@ int sweep(const TradeArgs& args, const scene::Scene& s, const runtime::StopSigna
   const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch(); };
   const trade::Watch watch{[&] { return std::chrono::duration<double>(now()).count(); },
                            [&] { return stop.requested(); }};
-  trade::Reference reference;
-  std::vector<Measured> all;
-  {
-    Progress progress;
-    progress.say("converging the reference");
-    reference = trade::converge(motion, watch);
-    all = measure_all(motion, reference, args.quick, watch, progress);
-  }
+  const trade::Reference reference = trade::converge(motion, watch);
+  std::vector<Measured> all = measure_all(args, motion, reference, watch);
   if (stop.requested()) return runtime::kInterrupted;
   trade::mark_front(all, reference, by);
   print_reference(s, motion, reference);

@@ -15,6 +15,7 @@ struct TradeArgs {
   double accuracy = 0;              ///< joint error to recommend for [rad or m]; 0: no recommendation
   std::string by = "time";          ///< what counts as cost: time or evaluations
   bool quick = false;               ///< fewer candidates
+  int jobs = 1;                     ///< threads; with more than one their times are worth less
 };
 /// 0; 1 when nothing measured meets the accuracy; 2 bad input; 130 interrupted.
 int trade(const TradeArgs& args);

@@ -297,6 +297,11 @@ void read_reduce(const Fields& read, scene::ReduceOptions& o) {
   read("links", o.links);
   read("rate", o.rate);
   read("step", o.step);
+  read("self", o.self);
+  read("shapes", o.shapes);
+  read("merge", o.merge);
+  read("requery", o.requery);
+  read("cycle", o.cycle);
 }
 
 void read_accuracy(const Fields& read, scene::Accuracy& o) {

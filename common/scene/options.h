@@ -107,8 +107,13 @@ struct ReduceOptions {
   Choice gravity = Choice::automatic;    ///< exact: none where it works on no joint
   Choice obstacles = Choice::automatic;  ///< exact: those that can never matter are culled, set by set
   Choice links = Choice::automatic;      ///< exact but for their reports: links far from all are not measured
-  Choice rate = Choice::automatic;       ///< bounded: perception no faster than the obstacles need
-  Choice step = Choice::automatic;       ///< bounded: tier and step chosen for the accuracy
+  Choice self = Choice::automatic;       ///< exact: pairs of links that cannot have met yet are passed over
+  Choice shapes = Choice::automatic;     ///< bounded: links as fewer and simpler solids, outward
+  Choice merge = Choice::automatic;      ///< bounded: obstacles put together, outward
+  Choice requery = Choice::automatic;  ///< bounded, reports alone: links that went no way are not asked again
+  Choice rate = Choice::automatic;     ///< bounded: perception no faster than the obstacles need
+  Choice cycle = Choice::automatic;    ///< bounded: planner cycles no faster than anything closes in
+  Choice step = Choice::automatic;     ///< bounded: tier and step chosen for the accuracy
 };
 
 /// What `fastest` may cost, and what it is judged by.
@@ -116,7 +121,7 @@ struct Accuracy {
   double joint_error_rad = 1e-3;   ///< of any joint at any time of the horizon [rad or m], > 0
   double energy_error_rel = kInf;  ///< of the energy scale, > 0
   double horizon_s = 0;            ///< 0: the run; >= 0
-  double obstacle_error_m = 1e-3;  ///< how far an obstacle's surface may be off, > 0
+  double obstacle_error_m = 1e-3;  ///< how far a surface of an obstacle or a link may be off, > 0
 };
 
 enum class Pace : std::uint8_t { lockstep, realtime };

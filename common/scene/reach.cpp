@@ -66,13 +66,6 @@ ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   return ball;
 }
 
-/// Whose way is known; the planner watches the others to make out how they move.
-bool is_plain(const geometry::Obstacle& o) {
-  return o.X_WO.p.allFinite() && o.X_WO.R.allFinite() && o.shape.dims_m.allFinite() &&
-         (o.shape.dims_m.array() >= 0).all() && std::isfinite(o.sigma_m) && o.velocity_known &&
-         o.V_WO.allFinite() && o.V_WO.head<3>().isZero(0);
-}
-
 /// What the planner inflates it by.
 double inflation_m(const geometry::Obstacle& o) { return 2 * std::max(o.sigma_m, 0.0); }
 
@@ -87,24 +80,46 @@ double distance_bound_m(const Vector3d& p_W, const geometry::Obstacle& o) {
 
 }  // namespace
 
+Eigen::MatrixXd levers(const Robot& robot) {
+  const model::Chain& chain = robot.chain;
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(chain.n(), chain.n());
+  for (const LinkShape& s : robot.shapes) {
+    if (s.link < 0) continue;
+    const geometry::Capsule c = s.X_LS * geometry::enclosing_capsule(s.shape);
+    double beyond = std::max(c.p0.norm(), c.p1.norm()) + c.radius_m;  // from joint j's origin
+    for (int j = s.link; j >= 0; --j) {
+      const model::Joint& joint = chain.joint(j);
+      const bool slides = joint.kind == model::JointKind::prismatic;
+      out(j, s.link) = std::max(out(j, s.link), slides ? 1.0 : beyond);
+      beyond += joint.X_PJ.p.norm() + travel_m(joint);
+    }
+  }
+  return out;
+}
+
+bool Reach::is_plain(const geometry::Obstacle& o) {
+  return o.X_WO.p.allFinite() && o.X_WO.R.allFinite() && o.shape.dims_m.allFinite() &&
+         (o.shape.dims_m.array() >= 0).all() && std::isfinite(o.sigma_m) && o.velocity_known &&
+         o.V_WO.allFinite() && o.V_WO.head<3>().isZero(0);
+}
+
+double Reach::least_distance_m(const geometry::Obstacle& o, double horizon_s) const noexcept {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Centre& c : centres_) least = std::min(least, distance_m(c.p_W, o) - c.out_m);
+  return least - spread_m(o, horizon_s) - kSlack_m;
+}
+
 Reach::Reach(const Robot& robot, const PlannerOptions& options)
     : target_(target_ball(robot, options)),
       chain_(robot.chain),
       ws_(chain_),
-      lever_m_(Eigen::VectorXd::Zero(chain_.n())),
+      lever_m_(levers(robot).rowwise().maxCoeff()),
       rho0_m_(options.rho0_m),
       margin_m_(options.barrier_gain > 0 ? options.dmin_m : 0) {
   for (const LinkShape& s : robot.shapes) {
     const geometry::Capsule c = s.X_LS * geometry::enclosing_capsule(s.shape);
     bodies_.push_back({s.link, geometry::solid(s.shape, s.X_LS)});
     add_ball(ball_of(chain_, s.link, c));
-    double beyond = std::max(c.p0.norm(), c.p1.norm());  // from joint j's origin to the capsule's axis
-    for (int j = s.link; j >= 0; --j) {
-      const model::Joint& joint = chain_.joint(j);
-      const bool slides = joint.kind == model::JointKind::prismatic;
-      lever_m_[j] = std::max(lever_m_[j], slides ? 1.0 : beyond);
-      beyond += joint.X_PJ.p.norm() + travel_m(joint);
-    }
   }
 }
 
@@ -148,9 +163,7 @@ bool Reach::stays_near(const Eigen::VectorXd& q) const noexcept {
 void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstacle> set,
                       std::vector<geometry::Obstacle>& kept) {
   constexpr double inf = std::numeric_limits<double>::infinity();
-  const auto stands = [](const geometry::Obstacle& o) {
-    return is_plain(o) && o.velocity_known && o.V_WO.isZero(0);
-  };
+  const auto stands = [](const geometry::Obstacle& o) { return is_plain(o) && o.V_WO.isZero(0); };
   q_near_ = q;
   rbd::positions(chain_, q, ws_);
   const std::size_t m = bodies_.size();

@@ -19,6 +19,11 @@ struct ReachBall {
   double radius_m = 0;  ///< of the capsule
 };
 
+/// How far joint j moves what is farthest out on link i, for each radian (or metre) it goes: n x n (j, i),
+/// zero where joint j does not carry the link.  +inf beyond a slide without limits.  While slides keep to
+/// their limits no point of the link's shapes goes farther than the sum over j of that times |dq_j|.
+Eigen::MatrixXd levers(const Robot& robot);
+
 /// The balls of a robot: about a point of the first joint's axis, offsets stretched out, slides at their
 /// limits.
 ///
@@ -53,6 +58,12 @@ class Reach {
 
   std::span<const ReachBall> balls() const noexcept { return balls_; }
 
+  /// An obstacle of finite numbers whose way is known and straight; the planner watches the others to make
+  /// out how they move.
+  static bool is_plain(const geometry::Obstacle& o);
+  /// No link (nor the base) comes nearer to a plain obstacle within the horizon; may be negative.
+  double least_distance_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
+
  private:
   struct Body {
     int link = 0;
@@ -77,7 +88,7 @@ class Reach {
   ReachBall target_;  ///< where the end effector's body is when it is at a target that can be reached
   model::Chain chain_;
   rbd::Workspace ws_;
-  Eigen::VectorXd q_near_, lever_m_;  ///< where the last sift_near() was; how far each joint moves the arm
+  Eigen::VectorXd q_near_, lever_m_;  ///< where the last sift_near() was; the largest of each joint's levers
   std::vector<double> near_m_, nearest_m_;  ///< scratch: distances of obstacles, and the least
   std::vector<std::size_t> left_;           ///< scratch: what sift_roughly() leaves
   double rho0_m_ = 0, margin_m_ = 0;

@@ -2,39 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "common/rbd/planar_chain.h"
 #include "common/scene/locked.h"
 #include "common/scene/reach.h"
-#include "common/scene/rules.h"
+#include "common/scene/reduction_notes.h"
 
 namespace hamel::scene {
 namespace {
 
-constexpr double kParallel = 1e-12;     // gravity that is off an axis by less is along it
-constexpr double kLeastStreamHz = 30;   // a stream is resampled at least so often
-constexpr double kSetsInStaleness = 3;  // so many sets come while one of them would still be fresh
-
-std::string count(std::size_t k, const std::string& of) { return of + ": " + std::to_string(k); }
-
-Reduction& note(Scene& s, const std::string& name, bool in_force, const std::string& what,
-                const std::string& why) {
-  Reduction r;
-  r.name = name;
-  r.in_force = in_force;
-  r.what = what;
-  r.why = why;
-  s.reductions.push_back(std::move(r));
-  return s.reductions.back();
-}
-
-void sizes(Reduction& r, double before, double after, const std::string& unit) {
-  r.before = before;
-  r.after = after;
-  r.unit = unit;
-}
+constexpr double kParallel = 1e-12;  // gravity that is off an axis by less is along it
 
 void reduce_fixed(Scene& s) {
   const int n = s.robot.chain.n(), k = s.robot.fixed_joints;
@@ -120,12 +98,23 @@ void note_terms(Scene& s) {
        count(still, "zero dampings and rotor inertias stay, a product and a sum each, no branch"));
 }
 
-/// The scene's obstacles that stand still, as perception will publish them.
-std::vector<geometry::Obstacle> standing(const Scene& s) {
-  std::vector<geometry::Obstacle> out;
-  for (const ScriptedObstacle& o : s.perception.obstacles)
-    if (o.velocity_mps.isZero(0) && o.amplitude_m.isZero(0)) out.push_back(o.at_start);
-  return out;
+void note_self(Scene& s) {
+  if (!s.steered) return;
+  const std::size_t pairs = s.robot.self_pairs.size();
+  const bool on = wanted(s.reduce, s.reduce.self, true);
+  Reduction& r = note(s, "self", on && pairs > 0, count(pairs, "pairs of link shapes that must not touch"),
+                      pairs == 0 ? "none is watched"
+                      : on       ? "those far apart are passed over until the links may have come near"
+                                 : "forbidden");
+  r.live = true;
+}
+
+/// One evaluation for dynamics and planner of one process: it cannot pay, which services/README.md shows.
+void note_shared(Scene& s) {
+  if (!s.steered) return;
+  note(s, "shared", false, "no evaluation shared between services",
+       "poses and velocities at q are all they have in common, 4 % of a cycle of a 7-joint arm; they meet on "
+       "the bus alone");
 }
 
 void note_obstacles(Scene& s) {
@@ -139,10 +128,12 @@ void note_obstacles(Scene& s) {
   const bool cull = wanted(s.reduce, s.reduce.obstacles, true);
   const std::string rest = moving ? "; moving ones are looked at in each set" : "";
   if (!cull) kept = all;
-  sizes(note(s, "obstacles", cull, count(all.size() - kept.size(), "standing obstacles culled") + rest,
-             cull ? "out of reach of every force, and never the nearest to a link; each set is sifted once"
-                  : "forbidden"),
-        static_cast<double>(all.size()), static_cast<double>(kept.size()), "obstacles");
+  Reduction& culled =
+      note(s, "obstacles", cull, count(all.size() - kept.size(), "standing obstacles culled") + rest,
+           cull ? "out of reach of every force, and never the nearest to a link; each set is sifted once"
+                : "forbidden");
+  sizes(culled, static_cast<double>(all.size()), static_cast<double>(kept.size()), "obstacles");
+  culled.live = true;
   const bool skip = wanted(s.reduce, s.reduce.links, false);
   const auto far = static_cast<std::size_t>(std::count_if(
       floor_m.begin(), floor_m.end(), [&](double f) { return f > s.planner.rho0_m && std::isfinite(f); }));
@@ -154,41 +145,6 @@ void note_obstacles(Scene& s) {
         n, n - static_cast<int>(skip ? far : 0), "links");
 }
 
-/// The slowest rate at which no scripted obstacle, carried on from its last set, is off by more than asked.
-double rate_needed_hz(const Scene& s) {
-  double rate = kSetsInStaleness / s.planner.stale_slow_s;
-  if (s.perception.stream) rate = std::max(rate, kLeastStreamHz);
-  for (const ScriptedObstacle& o : s.perception.obstacles)
-    rate = std::max(rate, std::sqrt(carried_error_m(o, 1) / s.accuracy.obstacle_error_m));
-  return rate;
-}
-
-void reduce_rate(Scene& s) {
-  if (!s.steered) return;
-  const double before = s.perception.rate_hz, needed = rate_needed_hz(s);
-  const bool less = needed < before, on = less && wanted(s.reduce, s.reduce.rate, false);
-  if (on) s.perception.rate_hz = needed;
-  Reduction& r = note(s, "rate", on, on ? "obstacle sets published less often" : "obstacle sets as written",
-                      !less ? "the obstacles' motion, or their staleness, needs " + number(needed) + " Hz"
-                      : on  ? "carried on with their velocities they stay within the bound"
-                            : "fidelity: fastest would");
-  r.exact = false;
-  sizes(r, before, s.perception.rate_hz, "Hz");
-  for (const ScriptedObstacle& o : s.perception.obstacles)
-    r.bound = std::max(r.bound, on ? carried_error_m(o, 1 / s.perception.rate_hz) : 0);
-  r.bound_unit = std::string("m");
-}
-
-void note_step(Scene& s) {
-  const bool on = wanted(s.reduce, s.reduce.step, false);
-  Reduction& r = note(s, "step", false, "tier and step as written",
-                      on ? "chosen by hamel run, up, batch or explain, and not yet"
-                         : "fidelity: fastest would choose them for the accuracy");
-  r.exact = false;
-  sizes(r, s.dynamics.dt_s, s.dynamics.dt_s, "s");
-  r.bound_unit = std::string("rad");
-}
-
 }  // namespace
 
 bool wanted(const ReduceOptions& o, Choice choice, bool exact) noexcept {
@@ -196,9 +152,11 @@ bool wanted(const ReduceOptions& o, Choice choice, bool exact) noexcept {
   return exact ? o.fidelity != Fidelity::full : o.fidelity == Fidelity::fastest;
 }
 
-double carried_error_m(const ScriptedObstacle& o, double period_s) noexcept {
-  const double turn = 2 * std::numbers::pi * o.frequency_hz;
-  return 0.5 * turn * turn * o.amplitude_m.norm() * period_s * period_s;
+std::vector<geometry::Obstacle> standing(const Scene& s) {
+  std::vector<geometry::Obstacle> out;
+  for (const ScriptedObstacle& o : s.perception.obstacles)
+    if (o.velocity_mps.isZero(0) && o.amplitude_m.isZero(0)) out.push_back(o.at_start);
+  return out;
 }
 
 void reduce(Scene& s) {
@@ -208,15 +166,17 @@ void reduce(Scene& s) {
   reduce_plane(s);
   reduce_gravity(s);
   note_terms(s);
+  note_self(s);
+  reduce_shapes(s);
   note_obstacles(s);
-  reduce_rate(s);
-  note_step(s);
+  reduce_bounded(s);
+  note_shared(s);
 }
 
 std::string names_in_force(const Scene& s) {
   std::string out;
   for (const Reduction& r : s.reductions) {
-    const bool did = r.in_force && (r.before != r.after || r.name == "obstacles" || r.name == "step");
+    const bool did = r.in_force && (r.before != r.after || r.live);
     if (did) out.append(out.empty() ? "" : ", ").append(r.name);
   }
   if (out.empty()) out.append("none");

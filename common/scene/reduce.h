@@ -20,10 +20,18 @@ namespace hamel::scene {
 ///   gravity    exact: zero where it works on no joint, that is parallel to every revolute axis and across
 ///              every slide of a planar arm; the potential energy loses its constant
 ///   terms      exact: stop torques are not evaluated where there are no stops
+///   self       exact: pairs of links are passed over while they cannot have come near each other
 ///   obstacles  exact: those that never matter (reach.h) are dropped from each set as it arrives
 ///   links      exact in all but one thing, so only for `fastest`: links that no obstacle comes near are not
 ///              asked for distances and report none
+///   shapes     bounded [m]: links as fewer and simpler solids, outward (outward.h)
+///   merge      bounded [m]: obstacles of a set put together, outward (outward.h)
+///   requery    bounded [m]: links out of range are asked for distances when they may have gone so far;
+///              commands stay the same, reported distances are off
 ///   rate       bounded [m]: scripted obstacles are published no faster than carrying them on needs
+///   cycle      bounded [m]: planner cycles no faster than needed for nothing to close in by more between
+///   two,
+///              at the speed that the end effector is drawn with and those of scripted obstacles
 ///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
 void reduce(Scene& s);
 

@@ -116,6 +116,7 @@ struct Reduction {
   std::string unit;  ///< of before and after
   double bound = 0;  ///< of a bounded one that is in force
   std::string bound_unit = {};
+  bool live = false;  ///< goes by what happens in the run, whatever its sizes at the start
 };
 
 /// One run.

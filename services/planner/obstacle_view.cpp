@@ -14,12 +14,22 @@ constexpr std::size_t kMaxSources = 16;
 constexpr std::size_t kWorthwhile = 2;  ///< a lone obstacle is the nearest anyway
 constexpr double kHorizon_s = 5;        ///< a moving obstacle is culled when it is out of reach for so long
 
+constexpr std::size_t kMost = 4096;  ///< more are a fault of whoever sends them, and the planner says so
+
 }  // namespace
+
+Savings savings(const scene::Scene& scene) {
+  const scene::ReduceOptions& r = scene.reduce;
+  return {.far_links = scene::wanted(r, r.self, true),
+          .requery_m = scene::wanted(r, r.requery, false) ? scene.accuracy.obstacle_error_m : 0};
+}
 
 ObstacleView::ObstacleView(const scene::Scene& scene)
     : cull_(scene::wanted(scene.reduce, scene.reduce.obstacles, true)),
       skip_links_(scene::wanted(scene.reduce, scene.reduce.links, false)) {
-  if (cull_ || skip_links_) reach_.emplace(scene.robot, scene.planner);
+  const bool merge = scene::wanted(scene.reduce, scene.reduce.merge, false);
+  if (merge) merge_.emplace(scene.accuracy.obstacle_error_m, scene.planner.rho0_m);
+  if (cull_ || skip_links_ || merge) reach_.emplace(scene.robot, scene.planner);
 }
 
 void ObstacleView::begin(std::uint64_t incarnation) {
@@ -73,10 +83,10 @@ double ObstacleView::at(double t_s, const Eigen::VectorXd& q, wire::Causes& caus
     if (std::isfinite(s.next_t_s)) oldest = std::max(oldest, t_s - s.t_s);
   }
   if (changed_) put_together();
-  const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q);
+  const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q) && all_.size() <= kMost;
   std::uint64_t which = 1;  // of the three vectors is shown
   shown_ = all_;
-  if (sound && cull_ && kept_.size() < kWorthwhile) {
+  if (sound && (merge_ || cull_) && (!cull_ || kept_.size() < kWorthwhile)) {
     shown_ = kept_;
     which = 2;
   } else if (sound && cull_) {
@@ -101,7 +111,12 @@ void ObstacleView::put_together() {
   for (const auto& [source, queue] : sources_)
     if (current(queue))
       all_.insert(all_.end(), queue.front().obstacles.begin(), queue.front().obstacles.end());
-  if (reach_) reach_->sift(all_, kHorizon_s, kept_, floor_m_);
+  if (!reach_) return;
+  reach_->sift(all_, kHorizon_s, kept_, floor_m_);
+  if (!merge_) return;
+  if (!cull_) kept_ = all_;
+  merge_->apply(*reach_, kHorizon_s, kept_);
+  for (double& floor : floor_m_) floor -= merge_->excess_m();
 }
 
 }  // namespace hamel::planner

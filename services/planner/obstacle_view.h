@@ -10,17 +10,22 @@
 #include <span>
 #include <vector>
 
+#include "common/scene/outward.h"
 #include "common/scene/reach.h"
 #include "common/wire/messages.h"
+#include "services/planner/core/savings.h"
 
 namespace hamel::planner {
+
+/// What the scene's reductions `self` and `requery` spare a planner.
+Savings savings(const scene::Scene& scene);
 
 class ObstacleView {
  public:
   /// Shows every obstacle.
   ObstacleView() = default;
-  /// Leaves out what the scene's reductions `obstacles` and `links` allow; the planner's commands are the
-  /// same.
+  /// Leaves out what the scene's reductions `obstacles` and `links` allow, the planner's commands are the
+  /// same; puts together what `merge` allows.
   explicit ObstacleView(const scene::Scene& scene);
   ObstacleView(const ObstacleView&) = delete;  // what it shows points into it
   ObstacleView& operator=(const ObstacleView&) = delete;
@@ -59,6 +64,7 @@ class ObstacleView {
   std::map<std::uint32_t, Queue> sources_;
   std::uint64_t set_ = 0, sifts_ = 0;
   std::optional<scene::Reach> reach_;
+  std::optional<scene::Merge> merge_;
   bool cull_ = false, skip_links_ = false;
   bool changed_ = false;      ///< other sets hold than when all_ was put together
   bool near_is_old_ = false;  ///< near_ is of other sets

@@ -43,7 +43,7 @@ PlannerService::PlannerService(bus::Node& node, const scene::Scene& scene, const
     : scene_(scene),
       config_(config),
       fingerprint_(scene::fingerprint(scene)),
-      planner_(scene_.robot, scene_.planner),
+      planner_(scene_.robot, scene_.planner, savings(scene_)),
       output_(planner_.output()),
       goal_(scene.goal),
       command_out_(node),
@@ -152,7 +152,7 @@ void PlannerService::meet(const wire::ArmState& s) {
   if (known) spdlog::info("arm {} began anew (incarnation {})", s.arm, s.incarnation);
   view_.begin(s.incarnation);
   memory_step_.reset();
-  planner_ = Planner(scene_.robot, scene_.planner);
+  planner_ = Planner(scene_.robot, scene_.planner, savings(scene_));
   if (goal_) planner_.set_goal(*goal_);
 }
 

@@ -35,6 +35,19 @@ inline scene::LinkShape random_capsule(Random& rng, int link) {
   return link_capsule(link, rng.vec3(0.2), rng.vec3(0.2), rng.uniform(0.01, 0.05));
 }
 
+/// A box or a cylinder about a link, and one at the base.
+inline void clothe(scene::Robot& robot, Random& rng) {
+  for (int link = -1; link < robot.chain.n(); ++link) {
+    const Eigen::Vector3d d(rng.uniform(0.02, 0.15), rng.uniform(0.02, 0.15), rng.uniform(0.02, 0.15));
+    const auto kind = rng.coin(0.5) ? geometry::ShapeKind::box : geometry::ShapeKind::cylinder;
+    robot.shapes.push_back({link, {kind, d}, rng.pose(0.15)});
+  }
+  for (std::size_t b = 0; b < robot.shapes.size(); ++b)
+    for (std::size_t a = 0; a < robot.shapes.size(); ++a)
+      if (robot.shapes[a].link < robot.shapes[b].link - 1 && rng.coin(0.5))
+        robot.self_pairs.emplace_back(a, b);
+}
+
 /// A steered arm of 2 to 7 joints among up to 40 obstacles, some of them far; `planar`: on a plane, sometimes
 /// with gravity across it; sometimes with joints that are locked.
 inline scene::Scene random_scene(Random& rng, bool planar, double locked) {

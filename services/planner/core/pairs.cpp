@@ -6,6 +6,7 @@
 #include <limits>
 #include <tuple>
 
+#include "common/scene/reach.h"
 #include "services/planner/core/mapping.h"
 
 namespace hamel::planner {
@@ -27,6 +28,8 @@ void move(geometry::Obstacle& o, double age_s) {
   const double angle = turn.norm();
   if (angle > 1e-12) o.X_WO.R = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * o.X_WO.R;
 }
+
+constexpr double kOwnWay_m = 0.05;  // what list_near_links() found is good for so far a way of the links
 
 constexpr double kForget_s = 1;  // a gap after which an obstacle counts as new
 
@@ -126,7 +129,9 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
   set_size_ = stamped.size();
   items_.clear();
   estimated_ = unknown_ = 0;
+  fastest_mps_ = 0;
   const double age = std::isfinite(age_s) ? std::max(age_s, 0.0) : 0.0;
+  age_s_ = age;
   for (const std::size_t k : near_) {
     const geometry::Obstacle& s = stamped[k];
     Item item{s, {}, 2 * std::max(s.sigma_m, 0.0), k};
@@ -141,14 +146,22 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
         ++unknown_;
       }
     }
+    const double grows = s.velocity_known ? 0 : o.assumed_speed_mps;
+    const double speed = item.now.V_WO.tail<3>().norm() + grows;
+    fastest_mps_ = item.now.V_WO.head<3>().isZero(0) ? std::max(fastest_mps_, speed) : scene::kInf;
     move(item.now, age);
     item.solid = geometry::solid(item.now.shape, item.now.X_WO);
     items_.push_back(item);
   }
 }
 
-Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
+Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options, const Savings& savings)
     : options_(options),
+      savings_(savings),
+      levers_m_(scene::levers(robot)),
+      slide_m_(Eigen::VectorXd::Constant(robot.chain.n(), scene::kInf)),
+      asked_(static_cast<std::size_t>(robot.chain.n())),
+      rests_(asked_.size(), false),
       pairs_(kMost),
       nearest_(static_cast<std::size_t>(robot.chain.n())),
       n_(robot.chain.n()),
@@ -173,6 +186,15 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options)
       const std::pair both{bodies_[a].of_robot, bodies_[b].of_robot};
       if (std::count(robot.self_pairs.begin(), robot.self_pairs.end(), both) > 0) own_.push_back({a, b});
     }
+  near_own_.reserve(own_.size());
+  lever_m_ = levers_m_.rowwise().maxCoeff();
+  q_own_ = Eigen::VectorXd::Constant(n_, std::numeric_limits<double>::quiet_NaN());  // near nothing
+  for (Asked& a : asked_) a.q = q_own_;
+  for (int j = 0; j < robot.chain.n(); ++j) {
+    const model::Joint& joint = robot.chain.joint(j);
+    if (joint.kind == model::JointKind::prismatic)
+      slide_m_[j] = std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
+  }
   links_.resize(bodies_.size());
   for (std::size_t k = 0; k < bodies_.size(); ++k) {
     links_[k].now.shape = bodies_[k].solid_B.shape;
@@ -188,25 +210,64 @@ void Pairs::clear() noexcept {
   for (Nearest& n : nearest_) n = Nearest{};
 }
 
-void Pairs::place(const Arm& arm) noexcept {
-  for (Body& b : bodies_)
-    b.solid_W = (b.link < 0 ? arm.chain.X_WB0() : arm.ws.X_WB[static_cast<std::size_t>(b.link)]) * b.solid_B;
+const geometry::Solid& Pairs::place(const Arm& arm, Body& b) noexcept {
+  if (b.placed != placing_) {
+    const lie::Pose& X_WB = b.link < 0 ? arm.chain.X_WB0() : arm.ws.X_WB[static_cast<std::size_t>(b.link)];
+    b.solid_W = X_WB * b.solid_B;
+    b.placed = placing_;
+  }
+  return b.solid_W;
+}
+
+// The levers hold for slides within their limits.
+bool Pairs::slides_hold(const Eigen::VectorXd& q) const noexcept {
+  return (q.array().abs() <= slide_m_.array()).all();
+}
+
+// True while the link, and what moves, cannot have gone farther than its distances may be off, nor into
+// range.
+bool Pairs::rests(const Arm& arm, const Obstacles& obstacles, std::size_t link) const noexcept {
+  const Asked& a = asked_[link];
+  if (!(a.spare_m > 0) || !a.nearest.item) return false;
+  double way = obstacles.fastest_mps() * std::abs(obstacles.age_s() - a.age_s);
+  for (Eigen::Index j = 0; j <= static_cast<Eigen::Index>(link); ++j)
+    way += levers_m_(j, static_cast<Eigen::Index>(link)) * std::abs(arm.q[j] - a.q[j]);
+  return way < std::min(savings_.requery_m, a.spare_m);
 }
 
 void Pairs::find(const Arm& arm, const Obstacles& obstacles, std::span<const double> link_floor_m) noexcept {
+  const bool same_set = obstacles.set() != 0 && obstacles.set() == asked_set_;
+  const bool may_rest = savings_.requery_m > 0 && same_set && slides_hold(arm.q);
+  asked_set_ = obstacles.set();
+  for (std::size_t link = 0; link < rests_.size(); ++link) {
+    rests_[link] = may_rest && rests(arm, obstacles, link);
+    if (rests_[link]) continue;
+    asked_[link].q = arm.q;
+    asked_[link].age_s = obstacles.age_s();
+    asked_[link].spare_m = std::numeric_limits<double>::infinity();
+  }
   clear();
-  place(arm);
+  for (std::size_t link = 0; link < rests_.size(); ++link)
+    if (rests_[link]) nearest_[link] = asked_[link].nearest;
+  ++placing_;
   const auto floor_of = [&](const Body& body) {
     const auto link = static_cast<std::size_t>(body.link);
     return link < link_floor_m.size() ? link_floor_m[link] : -std::numeric_limits<double>::infinity();
   };
   const auto is_far = [&](const Body& body) { return body.link >= 0 && floor_of(body) > options_.rho0_m; };
-  for (const Body& body : bodies_) {
-    if (body.link < 0) touch_base(body, obstacles);
-    if (body.link >= 0 && !is_far(body)) measure(body, obstacles);
+  for (Body& body : bodies_) {
+    if (body.link < 0)
+      touch_base(arm, body, obstacles);
+    else if (rests_[static_cast<std::size_t>(body.link)])
+      clearance_m_ = std::min(clearance_m_, nearest_[static_cast<std::size_t>(body.link)].at.distance_m);
+    else if (!is_far(body))
+      measure(arm, body, obstacles);
   }
-  for (const Body& body : bodies_)
-    if (is_far(body) && floor_of(body) < clearance_m_) measure(body, obstacles);
+  for (Body& body : bodies_)
+    if (is_far(body) && !rests_[static_cast<std::size_t>(body.link)] && floor_of(body) < clearance_m_)
+      measure(arm, body, obstacles);
+  if (savings_.requery_m > 0)
+    for (std::size_t link = 0; link < rests_.size(); ++link) asked_[link].nearest = nearest_[link];
   if (dropped_ > 0)
     std::sort(
         pairs_.begin(), pairs_.begin() + static_cast<std::ptrdiff_t>(count_),
@@ -219,23 +280,40 @@ void Pairs::find(const Arm& arm, const Obstacles& obstacles, std::span<const dou
 
 // The base does not move: there is nothing to steer, but who runs into it has touched the arm.  What stands
 // touches it by design.
-void Pairs::touch_base(const Body& base, const Obstacles& obstacles) noexcept {
+void Pairs::touch_base(const Arm& arm, Body& body, const Obstacles& obstacles) noexcept {
+  const geometry::Solid& base_W = place(arm, body);
   for (const Obstacles::Item& item : obstacles.items()) {
     const bool stands = item.now.velocity_known && item.now.V_WO.isZero(0);
-    if (stands || geometry::distance_bound(base.solid_W, item.solid) > 0) continue;
-    const double d = geometry::closest(base.solid_W, item.solid).distance_m;
+    if (stands || geometry::distance_bound(base_W, item.solid) > 0) continue;
+    const double d = geometry::closest(base_W, item.solid).distance_m;
     if (!(d < 0)) continue;
     base_touched_ = true;
     clearance_m_ = std::min(clearance_m_, d);
   }
 }
 
+// Pairs of two links that may come into range while no link goes farther than kOwnWay_m against another: one
+// moves against the other by no more than the joints between them carry it.
+void Pairs::list_near_links(const Arm& arm) noexcept {
+  near_own_.clear();
+  q_own_ = arm.q;
+  const double range = std::min(options_.rho0_m, kSelfRange_m) + kOwnWay_m;
+  for (const Own& own : own_) {
+    const geometry::Solid &a = place(arm, bodies_[own.a]), &b = place(arm, bodies_[own.b]);
+    if (!(geometry::distance_bound(b, a) > range)) near_own_.push_back(own);
+  }
+}
+
 // Pairs of two links: the one nearer to the base stands for the obstacle, with the twist it has.
 void Pairs::find_self(const Arm& arm) noexcept {
   const double range = std::min(options_.rho0_m, kSelfRange_m);
-  for (const Own& own : own_) {
-    const Body &a = bodies_[own.a], &b = bodies_[own.b];
-    if (geometry::distance_bound(b.solid_W, a.solid_W) > range) continue;
+  if (savings_.far_links) {
+    const double way = lever_m_.dot((arm.q - q_own_).cwiseAbs());
+    if (!(way < kOwnWay_m) || !slides_hold(arm.q)) list_near_links(arm);
+  }
+  for (const Own& own : savings_.far_links ? near_own_ : own_) {
+    Body &a = bodies_[own.a], &b = bodies_[own.b];
+    if (geometry::distance_bound(place(arm, b), place(arm, a)) > range) continue;
     Pair pair;
     pair.at = geometry::closest(b.solid_W, a.solid_W);
     pair.d = pair.at.distance_m;
@@ -268,13 +346,19 @@ void Pairs::find_self(const Arm& arm) noexcept {
   }
 }
 
-void Pairs::measure(const Body& body, const Obstacles& obstacles) noexcept {
+void Pairs::measure(const Arm& arm, Body& body, const Obstacles& obstacles) noexcept {
   Nearest& nearest = nearest_[static_cast<std::size_t>(body.link)];
+  double& spare = asked_[static_cast<std::size_t>(body.link)].spare_m;
+  const geometry::Solid& solid_W = place(arm, body);
   for (const Obstacles::Item& item : obstacles.items()) {
-    const double bound = geometry::distance_bound(body.solid_W, item.solid);
-    if (bound - item.inflation_m > options_.rho0_m && bound > nearest.at.distance_m) continue;
+    const double bound = geometry::distance_bound(solid_W, item.solid), far = bound - item.inflation_m;
+    if (far > options_.rho0_m && bound > nearest.at.distance_m) {
+      spare = std::min(spare, far - options_.rho0_m);
+      continue;
+    }
     Pair pair;
-    pair.at = geometry::closest(body.solid_W, item.solid);
+    pair.at = geometry::closest(solid_W, item.solid);
+    spare = std::min(spare, pair.at.distance_m - item.inflation_m - options_.rho0_m);
     if (pair.at.distance_m < nearest.at.distance_m) nearest = {&item, body.index, pair.at};
     pair.d = pair.at.distance_m - item.inflation_m;
     if (!(pair.d <= options_.rho0_m)) continue;
@@ -324,14 +408,14 @@ void Pairs::keep_nearest_of_each_link() noexcept {
 }
 
 void Pairs::advance(const Arm& arm, double ahead_s) noexcept {
-  place(arm);
-  const auto body = [&](int shape) -> const Body& {
+  ++placing_;
+  const auto body = [&](int shape) -> Body& {
     return bodies_[bodies_.size() - static_cast<std::size_t>(shapes_ - shape)];
   };
   for (Pair& pair : items()) {
     lie::Pose X_WO = pair.item->now.X_WO;
     X_WO.p += ahead_s * pair.item->now.V_WO.tail<3>();
-    pair.at = geometry::closest(body(pair.shape).solid_W, geometry::solid(pair.item->now.shape, X_WO));
+    pair.at = geometry::closest(place(arm, body(pair.shape)), geometry::solid(pair.item->now.shape, X_WO));
     pair.d = pair.at.distance_m - pair.item->inflation_m;
     pair.n = pair.at.normal;
   }

@@ -12,6 +12,7 @@
 #include "common/scene/scene.h"
 #include "services/planner/core/arm.h"
 #include "services/planner/core/memory.h"
+#include "services/planner/core/savings.h"
 
 namespace hamel::planner {
 
@@ -50,6 +51,12 @@ class Obstacles {
   int velocities_unknown() const noexcept { return unknown_; }
   bool all_finite() const noexcept { return all_finite_; }
   bool too_many() const noexcept { return too_many_; }
+  /// The number of the set taken last (0: not known) and its age.
+  std::uint64_t set() const noexcept { return set_; }
+  double age_s() const noexcept { return age_s_; }
+  /// No surface of items() comes nearer to anything by more than this a second while the set stays; +inf
+  /// where one turns.
+  double fastest_mps() const noexcept { return fastest_mps_; }
 
  private:
   bool in_reach(const geometry::Obstacle& o, const scene::PlannerOptions& options) const noexcept;
@@ -60,6 +67,7 @@ class Obstacles {
   std::vector<std::size_t> near_;  ///< of the set, in order of ids
   std::uint64_t set_ = 0;
   std::size_t set_size_ = 0;
+  double age_s_ = 0, fastest_mps_ = 0;
   int estimated_ = 0, unknown_ = 0;
   bool all_finite_ = true, too_many_ = false;
 };
@@ -91,7 +99,7 @@ class Pairs {
   static constexpr std::size_t kMaxSelf = 64;  ///< the nearest of the pairs of links in range
   static constexpr std::size_t kMost = kMaxPairs + kMaxSelf;
   static constexpr double kSelfRange_m = 0.1;  ///< pairs of links begin to count here (or at rho0)
-  Pairs(const scene::Robot& robot, const scene::PlannerOptions& options);
+  Pairs(const scene::Robot& robot, const scene::PlannerOptions& options, const Savings& savings = {});
 
   void clear() noexcept;
   /// Distances of every link shape to every obstacle; those within rho0 become pairs.  Links whose floor is
@@ -136,22 +144,41 @@ class Pairs {
     std::size_t of_robot = 0;  ///< index of its shape
     int index = 0, link = 0;
     geometry::Solid solid_B, solid_W;
+    std::uint64_t placed = 0;  ///< solid_W is of this placing
   };
   /// Two bodies that must not touch; the first is nearer to the base.
   struct Own {
     std::size_t a = 0, b = 0;
   };
-  void place(const Arm& arm) noexcept;
-  void touch_base(const Body& base, const Obstacles& obstacles) noexcept;
+  /// What was found when a link was last asked for distances.
+  struct Asked {
+    Eigen::VectorXd q;
+    double spare_m = 0;  ///< from range, at least; negative: in range
+    double age_s = 0;
+    Nearest nearest;
+  };
+  const geometry::Solid& place(const Arm& arm, Body& body) noexcept;
+  void touch_base(const Arm& arm, Body& base, const Obstacles& obstacles) noexcept;
   void find_self(const Arm& arm) noexcept;
-  void measure(const Body& body, const Obstacles& obstacles) noexcept;
+  void list_near_links(const Arm& arm) noexcept;
+  void measure(const Arm& arm, Body& body, const Obstacles& obstacles) noexcept;
+  bool rests(const Arm& arm, const Obstacles& obstacles, std::size_t link) const noexcept;
+  bool slides_hold(const Eigen::VectorXd& q) const noexcept;
   void offer(const Pair& pair) noexcept;
   void complete_self(const Arm& arm, std::size_t k) noexcept;
   void keep_nearest_of_each_link() noexcept;
 
   const scene::PlannerOptions& options_;
+  const Savings savings_;
   std::vector<Body> bodies_;
-  std::vector<Own> own_;
+  std::vector<Own> own_,
+      near_own_;  ///< near_own_: those that may come into range while the arm is near q_own_
+  Eigen::VectorXd q_own_, lever_m_;  ///< lever_m_: the largest of each joint's levers
+  Eigen::MatrixXd levers_m_;         ///< (joint, link)
+  Eigen::VectorXd slide_m_;          ///< how far each slide goes, +inf for joints that turn
+  std::vector<Asked> asked_;         ///< each link
+  std::vector<bool> rests_;
+  std::uint64_t placing_ = 0, asked_set_ = 0;
   std::vector<Obstacles::Item> links_;  ///< each body as an obstacle to the others
   std::vector<Pair> pairs_;
   std::size_t count_ = 0, self_count_ = 0;

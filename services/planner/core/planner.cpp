@@ -32,14 +32,14 @@ constexpr double kNearWaypoint = 0.15, kWaypoint_s = 4;  // a waypoint is passed
 }  // namespace
 
 struct Planner::Impl {
-  Impl(const scene::Robot& robot, const Options& o)
+  Impl(const scene::Robot& robot, const Options& o, const Savings& savings)
       : options(o),
         arm(robot.chain),
         attraction(arm, options),
         gyro(arm, options),
         barrier(arm, options),
         obstacles(workspace(robot)),
-        pairs(robot, options),
+        pairs(robot, options, savings),
         tau_att(VectorXd::Zero(arm.n())),
         qdd_att(tau_att),
         qdd(tau_att),
@@ -92,8 +92,8 @@ struct Planner::Impl {
   Memory memory;
 };
 
-Planner::Planner(const scene::Robot& robot, const Options& options)
-    : impl_(std::make_unique<Impl>(robot, options)) {}
+Planner::Planner(const scene::Robot& robot, const Options& options, const Savings& savings)
+    : impl_(std::make_unique<Impl>(robot, options, savings)) {}
 Planner::~Planner() = default;
 Planner::Planner(Planner&&) noexcept = default;
 Planner& Planner::operator=(Planner&&) noexcept = default;

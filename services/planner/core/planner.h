@@ -16,6 +16,7 @@
 #include "common/scene/options.h"
 #include "common/scene/scene.h"
 #include "services/planner/core/memory.h"
+#include "services/planner/core/savings.h"
 
 namespace hamel::planner {
 
@@ -122,7 +123,8 @@ struct EscapeQuestion;
 class Planner {
  public:
   /// `options` must be valid (scene::problems()).  Link shapes are taken as they are.
-  Planner(const scene::Robot& robot, const Options& options);
+  /// @param savings  what need not be measured in each cycle
+  Planner(const scene::Robot& robot, const Options& options, const Savings& savings = {});
   ~Planner();
   Planner(Planner&&) noexcept;
   Planner& operator=(Planner&&) noexcept;

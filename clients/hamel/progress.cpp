@@ -1,0 +1,44 @@
+#include "clients/hamel/progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <utility>
+
+namespace hamel::client {
+
+namespace {
+
+double clock_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+Progress::Progress(std::size_t of, std::string unit)
+    : terminal_(isatty(STDERR_FILENO) == 1),
+      of_(of),
+      unit_(std::move(unit)),
+      began_s_(clock_s()),
+      last_s_(began_s_) {}
+
+Progress::~Progress() {
+  if (terminal_ && shown_) fmt::print(stderr, "\r\033[K");
+}
+
+void Progress::say(std::size_t done, const std::string& what) {
+  const double now = clock_s(), passed = now - began_s_;
+  if (done < of_ && now - last_s_ < (terminal_ ? 0.2 : 10.0)) return;
+  if (done == of_ && !shown_ && !terminal_) return;  // it was quick
+  last_s_ = now;
+  shown_ = true;
+  const double rate = passed > 0 ? static_cast<double>(done) / passed : 0;
+  const double left = rate > 0 ? static_cast<double>(of_ - done) / rate : 0;
+  fmt::print(stderr, "{}{}/{} {}, {:.1f} a second, {:.0f} s to go{}{}{}", terminal_ ? "\r\033[K" : "", done,
+             of_, unit_, rate, left, what.empty() ? "" : ": ", what, terminal_ ? "" : "\n");
+  std::fflush(stderr);
+}
+
+}  // namespace hamel::client
