@@ -175,8 +175,13 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
     const geometry::Solid solid_W = ws_.X_WB[link] * bodies_[b].solid_B;
     for (std::size_t k = 0; k < set.size(); ++k) {
       if (!stands(set[k])) continue;
-      near_m_[k * m + b] = geometry::closest(solid_W, geometry::solid(set[k].shape, set[k].X_WO)).distance_m;
-      nearest_m_[link] = std::min(nearest_m_[link], near_m_[k * m + b]);
+      const geometry::Solid there = geometry::solid(set[k].shape, set[k].X_WO);
+      double& near = near_m_[k * m + b];
+      near = geometry::distance_bound(solid_W, there);
+      const double grown = inflation_m(set[k]);
+      if (near > std::max(rho0_m_ + grown, nearest_m_[link]) + 2 * kNear_m + kSlack_m) continue;
+      near = geometry::closest(solid_W, there).distance_m;
+      nearest_m_[link] = std::min(nearest_m_[link], near);
     }
   }
   kept.clear();
