@@ -68,7 +68,7 @@ class Fastest(unittest.TestCase):
     def test_bounded_reductions_are_forced_one_by_one_and_the_summary_names_them(self):
         _, o = outcome("run", scene("panda_reach"), "--duration", "0.2", "--set", "reduce.requery=on", "--set", "reduce.cycle=on",
                        "--set", "accuracy.obstacle_error_m=0.004")
-        self.assertEqual(o["reductions"], "self, obstacles, requery, cycle")
+        self.assertEqual(o["reductions"], "fixed, self, obstacles, requery, cycle")
         _, plain = outcome("run", scene("panda_reach"), "--duration", "0.2")
         _, seldom = outcome("run", scene("panda_reach"), "--duration", "0.2", "--set", "reduce.requery=on")
         self.assertEqual(plain["trajectory_hash"], seldom["trajectory_hash"])
