@@ -51,8 +51,8 @@ ReachBall ball_of(const model::Chain& chain, int link, const geometry::Capsule& 
   return ball;
 }
 
-/// The ball about the shoulder within which a target counts as reachable, with the last link's capsule about
-/// it.
+/// The ball about the shoulder within which a target counts as reachable, with the last link about it however
+/// turned.
 ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   const model::Chain& chain = robot.chain;
   ReachBall ball;
@@ -60,9 +60,11 @@ ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   ball.centre_W = chain.X_WB0() * chain.joint(0).X_PJ.p;
   ball.axis_m = chain.X_NE().p.norm() + options.goal_tolerance_m + travel_m(chain.joint(0));
   for (int j = 1; j < chain.n(); ++j) ball.axis_m += chain.joint(j).X_PJ.p.norm() + travel_m(chain.joint(j));
-  for (const LinkShape& s : robot.shapes)
-    if (s.link == ball.link)
-      ball.radius_m = std::max(ball.radius_m, geometry::enclosing_capsule(s.shape).radius_m);
+  for (const LinkShape& s : robot.shapes) {
+    if (s.link != ball.link) continue;
+    const geometry::Capsule c_E = lie::inverse(chain.X_NE()) * s.X_LS * geometry::enclosing_capsule(s.shape);
+    ball.radius_m = std::max(ball.radius_m, std::max(c_E.p0.norm(), c_E.p1.norm()) + c_E.radius_m);
+  }
   return ball;
 }
 

@@ -189,6 +189,11 @@ TEST_P(RandomScenes, MeetWhateverComesWithTheSameBits) {
     if (rng.coin(0.1)) all.back().V_WO.head<3>() = rng.vec3(2);
   }
   const Eigen::Vector3d base = s.robot.chain.X_WB0().p;
+  if (rng.coin(0.5)) {  // something lies over the target
+    s.goal->kind = scene::GoalKind::pose;
+    s.goal->X_WG.R = lie::exp_so3(rng.vec3(2));
+    all.push_back(test::sphere(99, s.goal->X_WG.p + rng.vec3(0.3), 0.1));
+  }
   for (std::uint32_t id = 100; id < 103; ++id) {
     const Eigen::Vector3d way = rng.unit();
     all.push_back(test::sphere(id, base + rng.uniform(0.3, 1) * way, 0.1, -rng.uniform(0.5, 3) * way));
