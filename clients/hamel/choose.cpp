@@ -21,18 +21,19 @@ constexpr double kBetween = 2;       // an error between two instants, of the la
 constexpr double kRounding = 1e-13;  // what a run adds up to [rad or m], at the least
 constexpr double kShortRun_s = 0.05;
 
-/// What an evaluation usually takes [us]: a fixed part and one for each joint, measured on one core.
+/// What an evaluation usually takes [us]: a fixed part and one for each joint, measured on one core; gauss
+/// evaluates its stages side by side.
 double evaluation_us(const scene::Scene& s, const scene::DynamicsOptions& o) {
   const bool flat = s.dynamics.space == scene::Space::automatic && rbd::is_planar(s.robot.chain);
   const double n = s.robot.chain.n();
   switch (o.tier) {
     case Tier::gauss:
-      return (0.02 + (flat ? 0.03 : 0.05) * n);
+      return (0.06 + (flat ? 0.045 : 0.08) * n) / o.stages;
     case Tier::rk4:
     case Tier::dopri8:
-      return 0.05 + (flat ? 0.05 : 0.09) * n;
+      return 0.02 + (flat ? 0.03 : 0.05) * n;
     default:
-      return 0.05 + (flat ? 0.05 : 0.11) * n;
+      return 0.02 + (flat ? 0.035 : 0.07) * n;
   }
 }
 

@@ -43,9 +43,10 @@ void print_reductions(const Explained& e) {
                r.exact ? "exact" : "bounded", quantity(r.before, r.unit), quantity(r.after, r.unit), r.unit,
                r.what);
     fmt::print("  {:<64}  {}\n", "", r.why);
-    if (!r.exact && r.in_force)
-      fmt::print("  {:<64}  bound {:.3g} {}, measured {:.3g}\n", "", r.bound, r.bound_unit,
-                 measured(e, r.name));
+    if (r.exact || !r.in_force) continue;
+    const double found = measured(e, r.name);
+    fmt::print("  {:<64}  bound {:.3g} {}, measured {:.3g}{}\n", "", r.bound, r.bound_unit, found,
+               found > r.bound * (1 + 1e-9) ? ": THE BOUND DOES NOT HOLD HERE" : "");
   }
   fmt::print("* in force.  Fidelity {}.\n", scene::to_string(e.reduced.reduce.fidelity));
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "clients/hamel/ticks.h"
 #include "common/scene/reduce.h"
@@ -88,29 +89,26 @@ scene::Scene alone(const scene::Scene& written, const std::string& name, bool wi
   return s;
 }
 
-double bound_of(const scene::Scene& s, const std::string& name) {
-  for (const scene::Reduction& r : s.reductions)
-    if (r.name == name) return r.bound;
-  return 0;
-}
+}  // namespace
 
 double closed_in(const scene::Scene& s, std::uint64_t steps) {
   Ticks ticks(s);
-  const double cycle_s = s.planner.period_steps * s.dynamics.dt_s;
-  const double obstacles_m = bound_of(s, "cycle") - s.planner.vmax_mps * cycle_s;
+  double obstacle_mps = 0;
+  for (const scene::ScriptedObstacle& o : s.perception.obstacles)
+    obstacle_mps = std::max(
+        obstacle_mps, o.velocity_mps.norm() + 2 * std::numbers::pi * o.frequency_hz * o.amplitude_m.norm());
+  const auto period = static_cast<std::uint64_t>(s.planner.period_steps);
   double most = 0;
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   for (std::uint64_t k = 0; k < steps && !ticks.done(); ++k) {
     ticks.plan();
     const Eigen::Vector3d now = ticks.report().end_effector_m;
-    if (k > 0) most = std::max(most, (now - before).norm());
-    before = now;
+    if (k > 0 && k % period == 0) most = std::max(most, (now - before).norm());
+    if (k % period == 0) before = now;
     if (!ticks.step()) break;
   }
-  return most + obstacles_m;
+  return most + obstacle_mps * s.planner.period_steps * s.dynamics.dt_s;
 }
-
-}  // namespace
 
 double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps) {
   Ticks a(reduced), b(exact);

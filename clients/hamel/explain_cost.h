@@ -41,6 +41,9 @@ struct Explained {
 /// Runs `reduced`, and beside it the planner of `exact` at the same states: by how much the distances that
 /// the links report differ at most [m].
 double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps);
+/// How far the end effector and the fastest scripted obstacle close in between two planner cycles, at most
+/// [m].
+double closed_in(const scene::Scene& reduced, std::uint64_t steps);
 /// Reduces `written` in every way and runs each for about `seconds` of CPU time, in turns.
 Explained explain_scene(const scene::Scene& written, double seconds, const trade::Watch& watch);
 

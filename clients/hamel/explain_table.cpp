@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "common/rbd/planar_chain.h"
@@ -35,12 +36,13 @@ scene::Scene as(const scene::Scene& written, scene::Fidelity fidelity) {
 void print_row(const Row& r, double full_s, double other_s) {
   const scene::Scene& s = r.scene;
   const double cycle_ms = 1e3 * s.planner.period_steps * s.dynamics.dt_s;
-  fmt::print("| {} | {} | {} {:.4g} ms | {} | {} | {:.1e} | {:.1e} | {:.3g} | {:.2f} | {} | {:.4g} |\n",
-             s.name, r.name, trade::label(s.dynamics), 1e3 * s.dynamics.dt_s,
-             s.steered ? fmt::format("{:.4g} ms", cycle_ms) : "", space_of(s), r.measured.joint_error,
-             r.measured.energy_error, 1e6 * r.measured.seconds_per_s, r.measured.seconds_per_s / full_s,
-             other_s > 0 ? fmt::format("{:.2f}", r.measured.seconds_per_s / other_s) : "",
-             1 / r.measured.seconds_per_s);
+  fmt::print(
+      "| {} | {} | {} {:.4g} ms | {} | {} | {:.1e} | {:.1e} | {:.3g} | {:.2f} | {} | {:.4g} |\n", s.name,
+      r.name, trade::label(s.dynamics), 1e3 * s.dynamics.dt_s,
+      s.steered ? fmt::format("{:.4g} ms", cycle_ms) : "", space_of(s), r.measured.joint_error,
+      r.measured.energy_error, 1e6 * r.measured.seconds_per_s, r.measured.seconds_per_s / full_s,
+      other_s > 0 && std::isfinite(other_s) ? fmt::format("{:.2f}", r.measured.seconds_per_s / other_s) : "",
+      1 / r.measured.seconds_per_s);
 }
 
 /// Full, default, chosen, then the others that keep to the accuracy in about the time of the chosen.

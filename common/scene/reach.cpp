@@ -51,8 +51,8 @@ ReachBall ball_of(const model::Chain& chain, int link, const geometry::Capsule& 
   return ball;
 }
 
-/// The ball about the shoulder within which a target counts as reachable, with the last link's capsule about
-/// it.
+/// The ball about the shoulder within which a target counts as reachable, with the last link about it however
+/// turned.
 ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   const model::Chain& chain = robot.chain;
   ReachBall ball;
@@ -60,10 +60,11 @@ ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   ball.centre_W = chain.X_WB0() * chain.joint(0).X_PJ.p;
   ball.axis_m = chain.X_NE().p.norm() + options.goal_tolerance_m + travel_m(chain.joint(0));
   for (int j = 1; j < chain.n(); ++j) ball.axis_m += chain.joint(j).X_PJ.p.norm() + travel_m(chain.joint(j));
-  for (const LinkShape& s : robot.shapes)
-    if (s.link == ball.link)
-      ball.radius_m =
-          std::max(ball.radius_m, (s.X_LS.p - chain.X_NE().p).norm() + geometry::solid(s.shape, {}).bound_m);
+  for (const LinkShape& s : robot.shapes) {
+    if (s.link != ball.link) continue;
+    const geometry::Capsule c_E = lie::inverse(chain.X_NE()) * s.X_LS * geometry::enclosing_capsule(s.shape);
+    ball.radius_m = std::max(ball.radius_m, std::max(c_E.p0.norm(), c_E.p1.norm()) + c_E.radius_m);
+  }
   return ball;
 }
 
@@ -176,8 +177,13 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
     const geometry::Solid solid_W = ws_.X_WB[link] * bodies_[b].solid_B;
     for (std::size_t k = 0; k < set.size(); ++k) {
       if (!stands(set[k])) continue;
-      near_m_[k * m + b] = geometry::closest(solid_W, geometry::solid(set[k].shape, set[k].X_WO)).distance_m;
-      nearest_m_[link] = std::min(nearest_m_[link], near_m_[k * m + b]);
+      const geometry::Solid there = geometry::solid(set[k].shape, set[k].X_WO);
+      double& near = near_m_[k * m + b];
+      near = geometry::distance_bound(solid_W, there);
+      const double grown = inflation_m(set[k]);
+      if (near > std::max(rho0_m_ + grown, nearest_m_[link]) + 2 * kNear_m + kSlack_m) continue;
+      near = geometry::closest(solid_W, there).distance_m;
+      nearest_m_[link] = std::min(nearest_m_[link], near);
     }
   }
   kept.clear();

@@ -27,11 +27,12 @@ namespace hamel::scene {
 ///   shapes     bounded [m]: links as fewer and simpler solids, outward (outward.h)
 ///   merge      bounded [m]: obstacles of a set put together, outward (outward.h)
 ///   requery    bounded [m]: links out of range are asked for distances when they may have gone so far;
-///              commands stay the same, reported distances are off
+///              commands stay the same, reported distances are off.  Only where it is `on`
 ///   rate       bounded [m]: scripted obstacles are published no faster than carrying them on needs
 ///   cycle      bounded [m]: planner cycles no faster than needed for nothing to close in by more between
 ///   two,
-///              at the speed that the end effector is drawn with and those of scripted obstacles
+///              at twice the speed that the end effector is drawn with and those of scripted obstacles (a
+///              singular start may be faster: explain measures it).  Only where it is `on`
 ///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
 void reduce(Scene& s);
 

@@ -14,6 +14,8 @@ namespace {
 constexpr double kLeastStreamHz = 30;   // a stream is resampled at least so often
 constexpr double kSetsInStaleness = 3;  // so many sets come while one of them would still be fresh
 constexpr double kSlowestCycle_s = 0.01;
+constexpr double kOvershoot =
+    2;  // an end effector may be faster than it is drawn: by barrier and circulation
 const std::string kWouldBe = "fidelity: fastest would";
 
 Reduction& note_bounded(Scene& s, const std::string& name, bool on, const std::string& what,
@@ -44,10 +46,11 @@ void note_merge(Scene& s) {
 }
 
 void note_requery(Scene& s) {
-  const bool on = wanted(s.reduce, s.reduce.requery, false);
+  const bool on = s.reduce.requery == Choice::on;
   Reduction& r = note_bounded(
       s, "requery", on, "links out of range asked for distances " + std::string(on ? "seldom" : "each cycle"),
-      on ? "they, and what moves, went no farther since; commands stay the same" : kWouldBe + " not");
+      on ? std::string("they, and what moves, went no farther since; commands stay the same")
+         : std::string("reduce { requery: on } would ask seldom; it bought nothing on the scenes measured"));
   r.bound = on ? s.accuracy.obstacle_error_m : 0;
   r.live = true;
 }
@@ -84,20 +87,21 @@ double fastest_obstacle_mps(const Scene& s) {
   return fastest;
 }
 
-/// A planner cycle is needed each time the end effector at its greatest wanted speed and the fastest obstacle
-/// may have closed in by what a surface may be off.
+/// A planner cycle is needed each time the end effector at twice its greatest wanted speed and the fastest
+/// obstacle may have closed in by what a surface may be off.
 void reduce_cycle(Scene& s) {
-  const double closing_mps = s.planner.vmax_mps + fastest_obstacle_mps(s);
+  const double closing_mps = kOvershoot * s.planner.vmax_mps + fastest_obstacle_mps(s);
   const double needed_s = std::min(s.accuracy.obstacle_error_m / closing_mps, kSlowestCycle_s);
   const int before = s.planner.period_steps;
   const int needed = static_cast<int>(std::floor(needed_s / s.dynamics.dt_s * (1 + 1e-9)));
-  const bool less = needed > before, on = less && wanted(s.reduce, s.reduce.cycle, false);
+  const bool less = needed > before, on = less && s.reduce.cycle == Choice::on;
   if (on) s.planner.period_steps = needed;
   const std::string why =
       std::isinf(closing_mps) ? "no speed limits how fast the arm or an obstacle closes in"
       : !less                 ? "the arm's and the obstacles' speeds need one each " + number(needed_s) + " s"
-      : on ? "at vmax_mps and the obstacles' speeds nothing closes in by more than the bound"
-           : kWouldBe;
+      : on ? "what closes in at up to twice vmax_mps and the obstacles' speeds does so by no more than the "
+             "bound"
+           : "reduce { cycle: on } would; fidelity: fastest chooses the planner's period with the step";
   Reduction& r =
       note_bounded(s, "cycle", on, on ? "planner cycles less often" : "planner cycles as written", why);
   sizes(r, 1 / (before * s.dynamics.dt_s), 1 / (s.planner.period_steps * s.dynamics.dt_s), "Hz");

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t kMaxWaiting = 64;  ///< sets ahead of time kept for one source
 constexpr std::size_t kMaxSources = 16;
-constexpr std::size_t kWorthwhile = 2;  ///< a lone obstacle is the nearest anyway
-constexpr double kHorizon_s = 5;        ///< a moving obstacle is culled when it is out of reach for so long
+constexpr std::size_t kWorthwhile = 16;  ///< fewer are measured sooner than sifted again and again
+constexpr double kHorizon_s = 5;         ///< a moving obstacle is culled when it is out of reach for so long
 
 constexpr std::size_t kMost = 4096;  ///< more are a fault of whoever sends them, and the planner says so
 
@@ -21,11 +21,13 @@ constexpr std::size_t kMost = 4096;  ///< more are a fault of whoever sends them
 Savings savings(const scene::Scene& scene) {
   const scene::ReduceOptions& r = scene.reduce;
   return {.far_links = scene::wanted(r, r.self, true),
-          .requery_m = scene::wanted(r, r.requery, false) ? scene.accuracy.obstacle_error_m : 0};
+          .requery_m = r.requery == scene::Choice::on ? scene.accuracy.obstacle_error_m : 0};
 }
 
 ObstacleView::ObstacleView(const scene::Scene& scene)
-    : cull_(scene::wanted(scene.reduce, scene.reduce.obstacles, true)),
+    : options_(scene.planner),
+      workspace_(workspace(scene.robot)),
+      cull_(scene::wanted(scene.reduce, scene.reduce.obstacles, true)),
       skip_links_(scene::wanted(scene.reduce, scene.reduce.links, false)) {
   const bool merge = scene::wanted(scene.reduce, scene.reduce.merge, false);
   if (merge) merge_.emplace(scene.accuracy.obstacle_error_m, scene.planner.rho0_m);
@@ -113,6 +115,10 @@ void ObstacleView::put_together() {
       all_.insert(all_.end(), queue.front().obstacles.begin(), queue.front().obstacles.end());
   if (!reach_) return;
   reach_->sift(all_, kHorizon_s, kept_, floor_m_);
+  // What the planner would not see is not worth sifting.
+  std::erase_if(kept_, [this](const geometry::Obstacle& o) {
+    return scene::Reach::is_plain(o) && !in_reach(workspace_, o, options_);
+  });
   if (!merge_) return;
   if (!cull_) kept_ = all_;
   merge_->apply(*reach_, kHorizon_s, kept_);

@@ -13,7 +13,7 @@
 #include "common/scene/outward.h"
 #include "common/scene/reach.h"
 #include "common/wire/messages.h"
-#include "services/planner/core/savings.h"
+#include "services/planner/core/pairs.h"
 
 namespace hamel::planner {
 
@@ -65,6 +65,8 @@ class ObstacleView {
   std::uint64_t set_ = 0, sifts_ = 0;
   std::optional<scene::Reach> reach_;
   std::optional<scene::Merge> merge_;
+  scene::PlannerOptions options_;
+  Workspace workspace_;
   bool cull_ = false, skip_links_ = false;
   bool changed_ = false;      ///< other sets hold than when all_ was put together
   bool near_is_old_ = false;  ///< near_ is of other sets

@@ -1,6 +1,7 @@
 // Exact reductions leave results as they are: every shipped scene, and random ones, against full fidelity.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -86,7 +87,7 @@ void expect_equal(const scene::Scene& written) {
     EXPECT_EQ(x.pairs_in_range, y.pairs_in_range);
     // An arm of fewer joints has a smaller workspace, and farther from it than kSeen_m nothing is seen.
     const bool smaller = full.robot.chain.n() != exact.robot.chain.n();
-    const double seen = smaller ? planner::Obstacles::kSeen_m : std::numeric_limits<double>::max();
+    const double seen = smaller ? planner::kSeen_m : std::numeric_limits<double>::max();
     EXPECT_NEAR(std::min(x.clearance_m, seen), std::min(y.clearance_m, seen), 100 * grown + 1e-12);
   }
   scene::Scene linked = exact;
@@ -188,6 +189,11 @@ TEST_P(RandomScenes, MeetWhateverComesWithTheSameBits) {
     if (rng.coin(0.1)) all.back().V_WO.head<3>() = rng.vec3(2);
   }
   const Eigen::Vector3d base = s.robot.chain.X_WB0().p;
+  if (rng.coin(0.5)) {  // something lies over the target
+    s.goal->kind = scene::GoalKind::pose;
+    s.goal->X_WG.R = lie::exp_so3(rng.vec3(2));
+    all.push_back(test::sphere(99, s.goal->X_WG.p + rng.vec3(0.3), 0.1));
+  }
   for (std::uint32_t id = 100; id < 103; ++id) {
     const Eigen::Vector3d way = rng.unit();
     all.push_back(test::sphere(id, base + rng.uniform(0.3, 1) * way, 0.1, -rng.uniform(0.5, 3) * way));
@@ -268,6 +274,37 @@ TEST(ExactReductions, LeaveOneStepMapsAsTheyAre) {
   for (int k = 0; k < 100; ++k) compare(test::random_scene(rng, true, 0), 20);
   EXPECT_LT(worst, 1e-13);
   RecordProperty("worst", std::to_string(worst));
+}
+
+/// Between two planner cycles that are as seldom as twice vmax allows, hardly any end effector closes in by
+/// more than the bound (no law keeps an arm from being faster); a bound of half of it would be broken more
+/// often.
+TEST(BoundedReductions, CyclesAreHardlyEverTooSeldom) {
+  test::Random rng(79);
+  std::vector<double> ratios;
+  int broken = 0, half_broken = 0;
+  for (int k = 0; k < 4000 && ratios.size() < 1000; ++k) {
+    scene::Scene s = test::random_scene(rng, k % 2 == 0, 0);
+    s.planner.vmax_mps = rng.uniform(0.1, 0.5);
+    s.dynamics.dt_s = 1e-3;
+    s.duration_s = 0.3;
+    s.accuracy.obstacle_error_m = rng.uniform(2e-3, 1e-2);
+    s.reduce.cycle = scene::Choice::on;
+    scene::reduce(s);
+    double bound = 0;
+    for (const scene::Reduction& r : s.reductions)
+      if (r.name == "cycle" && r.in_force) bound = r.bound;
+    if (bound == 0) continue;
+    const double closed = client::closed_in(s, 300);
+    broken += closed > bound * (1 + 1e-9);
+    ratios.push_back(bound / closed);
+    half_broken += closed > 0.5 * bound;
+  }
+  ASSERT_EQ(ratios.size(), 1000u);
+  std::nth_element(ratios.begin(), ratios.begin() + 500, ratios.end());
+  EXPECT_LT(ratios[500], 10);
+  EXPECT_LE(broken, 5);
+  EXPECT_GT(half_broken, 20);
 }
 
 /// Each bounded reduction by itself keeps distances within its bound, over runs of random scenes.

@@ -50,6 +50,29 @@ class Explain(unittest.TestCase):
 
 
 class Fastest(unittest.TestCase):
+    def test_explain_gives_each_bound_and_what_was_measured(self):
+        code, out, _ = hamel("explain", scene("panda_reach"), "--json", "--seconds", "0.02", "--set", "fidelity=fastest",
+                             "--set", "reduce.step=off", "--set", "perception.rate_hz=100", "--set", "reduce.requery=on",
+                             "--set", "reduce.cycle=on", "--set", "accuracy.obstacle_error_m=0.004")
+        self.assertEqual(code, 0)
+        j = json.loads(out)
+        bounds = {b["name"]: b for b in j["bounds"]}
+        self.assertEqual(set(bounds), {"requery", "rate", "cycle"})
+        for b in bounds.values():
+            self.assertLessEqual(b["measured"], b["bound"] * 1.001, b)
+        self.assertGreater(bounds["requery"]["measured"], 0.02 * bounds["requery"]["bound"])
+        names = [r["name"] for r in j["reductions"]]
+        for name in ("self", "shapes", "merge", "requery", "cycle", "shared"):
+            self.assertIn(name, names)
+
+    def test_bounded_reductions_are_forced_one_by_one_and_the_summary_names_them(self):
+        _, o = outcome("run", scene("panda_reach"), "--duration", "0.2", "--set", "reduce.requery=on", "--set", "reduce.cycle=on",
+                       "--set", "accuracy.obstacle_error_m=0.004")
+        self.assertEqual(o["reductions"], "fixed, self, obstacles, requery, cycle")
+        _, plain = outcome("run", scene("panda_reach"), "--duration", "0.2")
+        _, seldom = outcome("run", scene("panda_reach"), "--duration", "0.2", "--set", "reduce.requery=on")
+        self.assertEqual(plain["trajectory_hash"], seldom["trajectory_hash"])
+
     def test_run_chooses_tier_and_step_and_keeps_to_the_accuracy(self):
         code, out, _ = hamel("explain", scene("three_link_swing"), "--json", "--seconds", "0.02", "--set", "fidelity=fastest",
                              "--set", "duration_s=10", "--set", "accuracy.joint_error_rad=1e-5")

@@ -34,6 +34,7 @@ Vector3d surface(const Capsule& c, test::Random& rng) {
   const Vector3d axis = c.p1 - c.p0;
   if (along > 0 && along < 1 && !axis.isZero(0))
     out = (out - axis * (axis.dot(out) / axis.squaredNorm())).normalized();
+  if ((along == 0 && axis.dot(out) > 0) || (along == 1 && axis.dot(out) < 0)) out = -out;
   return c.p0 + along * axis + c.radius_m * out;
 }
 

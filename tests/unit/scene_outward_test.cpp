@@ -180,14 +180,14 @@ TEST(Cycle, IsAsLongAsTheSpeedsAllow) {
     s.planner.vmax_mps = rng.uniform(0.05, 1);
     s.dynamics.dt_s = std::pow(10, rng.uniform(-4, -2.5));
     s.accuracy.obstacle_error_m = std::pow(10, rng.uniform(-3.5, -2));
-    s.reduce.fidelity = Fidelity::fastest;
+    s.reduce.cycle = Choice::on;
     double fastest = 0;
     for (const ScriptedObstacle& o : s.perception.obstacles)
       fastest = std::max(fastest, o.velocity_mps.norm() + 2 * M_PI * o.frequency_hz * o.amplitude_m.norm());
     reduce(s);
     const auto r = std::find_if(s.reductions.begin(), s.reductions.end(),
                                 [](const auto& x) { return x.name == "cycle"; });
-    const double closes = (s.planner.vmax_mps + fastest) * s.planner.period_steps * s.dynamics.dt_s;
+    const double closes = (2 * s.planner.vmax_mps + fastest) * s.planner.period_steps * s.dynamics.dt_s;
     if (!r->in_force) {
       EXPECT_EQ(s.planner.period_steps, 1);
       continue;
@@ -195,7 +195,7 @@ TEST(Cycle, IsAsLongAsTheSpeedsAllow) {
     ++longer;
     EXPECT_NEAR(r->bound, closes, 1e-12);
     EXPECT_LE(closes, s.accuracy.obstacle_error_m * (1 + 1e-6));
-    const bool longest = closes + (s.planner.vmax_mps + fastest) * s.dynamics.dt_s >
+    const bool longest = closes + (2 * s.planner.vmax_mps + fastest) * s.dynamics.dt_s >
                              s.accuracy.obstacle_error_m * (1 - 1e-6) ||
                          (s.planner.period_steps + 1) * s.dynamics.dt_s > 0.01 * (1 - 1e-6);
     EXPECT_TRUE(longest) << "one step more would do";

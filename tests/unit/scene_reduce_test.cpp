@@ -149,6 +149,40 @@ TEST_P(Reduced, ReachBallsHoldEveryConfiguration) {
   }
 }
 
+/// However the joints go, no point of a link's solid goes farther than its levers say; some nearly as far.
+TEST_P(Reduced, NoPointOfALinkGoesFartherThanItsLevers) {
+  Scene s = test::random_scene(rng, false, 0);
+  s.robot.shapes.clear();
+  test::clothe(s.robot, rng);
+  const Eigen::MatrixXd lever_m = levers(s.robot);
+  const model::Chain& chain = s.robot.chain;
+  rbd::Workspace before(chain), after(chain);
+  double closest = 0;
+  for (int k = 0; k < 50; ++k) {
+    VectorXd q = rng.vector(chain.n(), 0.5), to = q;
+    to[k % chain.n()] += rng.uniform(-0.05, 0.05);
+    if (k % 2 == 0) to += rng.vector(chain.n(), 0.02);
+    rbd::positions(chain, q, before);
+    rbd::positions(chain, to, after);
+    for (const LinkShape& shape : s.robot.shapes) {
+      if (shape.link < 0) continue;
+      const auto link = static_cast<std::size_t>(shape.link);
+      const double most = lever_m.col(shape.link).dot((to - q).cwiseAbs());
+      const Eigen::Vector3d d = shape.shape.dims_m;
+      const bool box = shape.shape.kind == geometry::ShapeKind::box;
+      const Eigen::Vector3d corner = box ? Eigen::Vector3d(0.5 * d) : Eigen::Vector3d(d[0], 0, 0.5 * d[1]);
+      for (int i = 0; i < 8; ++i) {
+        const Eigen::Vector3d sign(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+        const Eigen::Vector3d p = shape.X_LS * Eigen::Vector3d(sign.cwiseProduct(corner));
+        const double way = (after.X_WB[link] * p - before.X_WB[link] * p).norm();
+        EXPECT_LE(way, most + 1e-12);
+        if (most > 0) closest = std::max(closest, way / most);
+      }
+    }
+  }
+  EXPECT_GT(closest, 0.3);
+}
+
 /// No obstacle that was left out is in range of a link, or the nearest to one; no link is nearer than its
 /// floor.
 TEST_P(Reduced, WhatIsCulledNeverMatters) {

@@ -93,10 +93,11 @@ Obstacles::Obstacles(const Workspace& workspace) : workspace_(workspace) {
   near_.reserve(kMost);
 }
 
-bool Obstacles::in_reach(const geometry::Obstacle& o, const scene::PlannerOptions& options) const noexcept {
+bool in_reach(const Workspace& workspace, const geometry::Obstacle& o,
+              const scene::PlannerOptions& options) noexcept {
   geometry::Solid sphere;  // the workspace
-  sphere.X.p = workspace_.centre_W;
-  sphere.bound_m = workspace_.radius_m;
+  sphere.X.p = workspace.centre_W;
+  sphere.bound_m = workspace.radius_m;
   const double distance = geometry::distance_bound(sphere, geometry::solid(o.shape, o.X_WO));
   const double speed = o.velocity_known ? o.V_WO.tail<3>().norm() : kFastest_mps;
   const double felt = options.rho0_m + 2 * std::max(o.sigma_m, 0.0) + speed * options.stale_brake_s;
@@ -112,7 +113,7 @@ void Obstacles::sift(std::span<const geometry::Obstacle> stamped, const scene::P
   for (std::size_t k = 0; k < count; ++k) {
     if (!usable(stamped[k]))
       all_finite_ = false;
-    else if (in_reach(stamped[k], o))
+    else if (in_reach(workspace_, stamped[k], o))
       near_.push_back(k);
   }
   const auto before = [&](std::size_t a, std::size_t b) {

@@ -25,12 +25,17 @@ struct Workspace {
 };
 Workspace workspace(const scene::Robot& robot);
 
+/// Obstacles that come no nearer than this (or rho0) to the workspace are not seen.
+inline constexpr double kSeen_m = 0.5;
+/// True where an obstacle may be seen while its set holds.
+bool in_reach(const Workspace& workspace, const geometry::Obstacle& o,
+              const scene::PlannerOptions& options) noexcept;
+
 /// The obstacles of this cycle: extrapolated to now, in order of their ids (then of the input), only finite
 /// ones, and only those that come within kSeen_m (or rho0) of the workspace while their set holds.
 class Obstacles {
  public:
   static constexpr std::size_t kMost = 4096;
-  static constexpr double kSeen_m = 0.5;
   explicit Obstacles(const Workspace& workspace = {{}, scene::kInf});
   /// Takes a set `age_s` old at time t_s.  A moving obstacle goes on with its twist.  One of unknown velocity
   /// is watched: from its second set on it goes on with the velocity between the last two (the mean of that
@@ -59,7 +64,6 @@ class Obstacles {
   double fastest_mps() const noexcept { return fastest_mps_; }
 
  private:
-  bool in_reach(const geometry::Obstacle& o, const scene::PlannerOptions& options) const noexcept;
   void sift(std::span<const geometry::Obstacle> stamped, const scene::PlannerOptions& o) noexcept;
 
   Workspace workspace_;
