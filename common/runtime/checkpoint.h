@@ -15,7 +15,8 @@ namespace hamel::runtime {
 
 /// Two alternating slots in one file.  A killed process (-9) loses nothing written; after a power cut the
 /// last synced slot is found, at most a second old where sync() is called each second.  Each slot carries a
-/// sequence number, its size and an XXH3 of both; the newest slot that is whole wins.  One writer a file (locked).
+/// sequence number, its size and an XXH3 of both; the newest slot that is whole wins.  One writer a file
+/// (locked).
 class Checkpoint {
  public:
   /// Opens or makes `path` for payloads up to `capacity` bytes of the format `kind` (foreign formats are
