@@ -114,6 +114,64 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
   EXPECT_GT(compared, 100);
 }
 
+// A link that slides along an edge it is nearly parallel to: the exact second derivative grows without bound.
+TEST(DistanceCurvature, StaysBoundedBetweenNearlyParallelLines) {
+  const Vector3d ahead(1, 0, 0);
+  Obstacles::Item item;
+  item.now.shape = {geometry::ShapeKind::capsule, {0.02, 0.7, 0}};
+  for (double angle = 0.3; angle > 1e-9; angle *= 0.3) {
+    item.now.X_WO.R = Eigen::AngleAxisd(0.5 * M_PI, Vector3d::UnitY()).toRotationMatrix();
+    item.solid = geometry::solid(item.now.shape, item.now.X_WO);
+    geometry::Capsule link;
+    const Vector3d along(std::cos(angle), std::sin(angle), 0);
+    link.p0 = Vector3d(0, 0, 0.2) - 0.2 * along;
+    link.p1 = Vector3d(0, 0, 0.2) + 0.2 * along;
+    link.radius_m = 0.05;
+    Pair pair;
+    pair.item = &item;
+    pair.at = geometry::closest(link, item.now.shape, item.now.X_WO);
+    pair.n = pair.at.normal;
+    pair.span_m = 0.5;
+    const Vector3d omega(0.5, 1, 0);
+    pair.v = ahead + omega.cross(pair.at.on_link - pair.at.on_axis);
+    const double curvature = distance_curvature(pair, omega, 1.0 / 30);
+    EXPECT_TRUE(std::isfinite(curvature)) << angle;
+    EXPECT_GT(curvature, -200) << angle;
+  }
+}
+
+// Whatever stands in the way and whatever was wanted.
+TEST(Barrier, AsksForNoAccelerationBeyondItsBound) {
+  test::Random rng(4);
+  constexpr double kMost = 10;
+  int given_up = 0;
+  for (int k = 0; k < 2000; ++k) {
+    model::ChainSpec spec = test::random_chain(rng, 4).spec();
+    for (model::Joint& j : spec.joints) {
+      j.limits.lower = -2, j.limits.upper = 2;
+      j.limits.velocity = 2, j.limits.acceleration = kMost;
+    }
+    scene::Robot robot{"r", "", model::build(std::move(spec)).value(), {}};
+    for (int i = 0; i < 4; ++i) robot.shapes.push_back(test::link_capsule(i, {0, 0, 0}, {0.3, 0, 0}, 0.05));
+    const scene::PlannerOptions options;
+    Arm arm(robot.chain);
+    arm.update(rng.vector(4, 2), rng.vector(4, 4));
+    std::vector<geometry::Obstacle> seen;
+    for (std::uint32_t i = 1; i <= 5; ++i) seen.push_back(test::sphere(i, rng.vec3(1), 0.2, rng.vec3(2)));
+    Obstacles obstacles;
+    Memory memory;
+    obstacles.take(seen, 0, 0, options, memory);
+    Pairs pairs(robot, options);
+    pairs.find(arm, obstacles);
+    pairs.complete(arm);
+    Barrier barrier(arm, options);
+    VectorXd a = rng.vector(4, 1e4);
+    given_up += barrier.solve(arm, pairs, 1e-3, a).infeasible;
+    ASSERT_LE(a.lpNorm<Eigen::Infinity>(), Barrier::kMostOver * kMost) << k;
+  }
+  EXPECT_GT(given_up, 0);
+}
+
 using geometry::ShapeKind;
 constexpr double kRadius = 0.1;
 INSTANTIATE_TEST_SUITE_P(

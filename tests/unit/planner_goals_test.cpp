@@ -3,6 +3,7 @@
 
 #include "common/rbd/rbd.h"
 #include "common/scene/self_links.h"
+#include "services/planner/core/pairs.h"
 #include "services/planner/core/reachable.h"
 #include "tests/support/planner_scene.h"
 
@@ -70,6 +71,25 @@ TEST(Reach, RefusesWhatIsBeyondTheArmAndKnowsTheNearestPlace) {
     goal.X_WG.p = 3.9 * along;
     EXPECT_TRUE(reach(robot.chain, goal, {}).reachable) << angle;
   }
+}
+
+// A pose leaves the last link no choice; a position leaves it every turn.
+TEST(Blocked, ByWhatTheLastLinkCannotTake) {
+  const scene::Robot robot = test::planar_arm(2, 0.1, 0.05);  // its last link: 1 m behind the end effector
+  const scene::PlannerOptions options;
+  const Pairs pairs(robot, options);
+  Obstacles::Item beside;
+  beside.now = test::sphere(1, {-0.5, 0, 0}, 0.1);
+  beside.solid = geometry::solid(beside.now.shape, beside.now.X_WO);
+  lie::Pose X_WT;
+  EXPECT_TRUE(pairs.blocks(beside, X_WT, false, 0.01));
+  EXPECT_FALSE(pairs.blocks(beside, X_WT, true, 0.01));
+  X_WT.R = Eigen::AngleAxisd(0.5 * M_PI, Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_FALSE(pairs.blocks(beside, X_WT, false, 0.01));
+  Obstacles::Item upon;
+  upon.now = test::sphere(2, {0.14, 0, 0}, 0.1);  // within the radius of the link's end
+  upon.solid = geometry::solid(upon.now.shape, upon.now.X_WO);
+  EXPECT_TRUE(pairs.blocks(upon, X_WT, true, 0.01));
 }
 
 test::RunResult run_to(const scene::PlannerOptions& o, const Vector3d& target) {

@@ -128,7 +128,7 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
 
 // Limits of position like distances; speed may close half of what is left to its limit in a time 1/g, and in
 // one period never all of it.
-void Barrier::add_joint_rows(const Arm& arm, double dt_s, bool last_resort) noexcept {
+void Barrier::add_joint_rows(const Arm& arm, double dt_s) noexcept {
   const double g = gain_, rate = std::min(g, 1 / dt_s);
   const auto row = [&](int j, double sign, double b, double price) {  // sign * a_j >= b
     A_.col(rows_).setZero();
@@ -147,11 +147,6 @@ void Barrier::add_joint_rows(const Arm& arm, double dt_s, bool last_resort) noex
   hard_rows_ = rows_;
   for (int j = 0; j < arm.n(); ++j) {
     const double most = acceleration_limit(arm, j), speed = arm.chain.joint(j).limits.velocity;
-    if (last_resort) {
-      row(j, 1, -kMostOver * most, kJointPrice);
-      row(j, -1, -kMostOver * most, kJointPrice);
-      continue;
-    }
     row(j, 1, std::clamp(-rate * (speed + arm.qd[j]), -most, most), kSpeedPrice);
     row(j, -1, std::clamp(-rate * (speed - arm.qd[j]), -most, most), kSpeedPrice);
   }
@@ -174,12 +169,11 @@ void Barrier::add_torque_rows(const Arm& arm) noexcept {
   }
 }
 
-Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& a,
-                                bool last_resort) noexcept {
+Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& a) noexcept {
   rows_ = 0;
   gain_ = std::min(options_.barrier_gain, kGainPerStep / dt_s);
   add_pair_rows(arm, pairs);
-  add_joint_rows(arm, dt_s, last_resort);
+  add_joint_rows(arm, dt_s);
   add_torque_rows(arm);
   for (Eigen::Index i = 0; i < rows_; ++i) s_[i] = (b_[i] - A_.col(i).dot(a)) / length_[i];
   const bool solved = least_norm_.solve(C_, s_, give_, rows_);

@@ -37,18 +37,15 @@ class Barrier {
   /// by an active-set method in x = L^T (a - a0), M = L L^T.  Rows that contradict each other share the miss
   /// by their price: what is physical (torque, joint limits) before distance, distance before what a
   /// controller asks for (velocity, acceleration).
-  /// @param a  in: a0, out: the minimiser; no |a_j| beyond kMostOver times the joint's limit, whatever it
-  /// takes
-  /// @param last_resort  the rows cannot be met: accelerations may go up to that bound, distances give way to
-  /// it
-  Outcome solve(const Arm& arm, Pairs& pairs, double dt_s, Eigen::VectorXd& a,
-                bool last_resort = false) noexcept;
+  /// No |a_j| comes out beyond kMostOver times the joint's limit: more is cut off, and infeasible.
   static constexpr double kMostOver = 5;
+  /// @param a  in: a0, out: the minimiser
+  Outcome solve(const Arm& arm, Pairs& pairs, double dt_s, Eigen::VectorXd& a) noexcept;
 
  private:
   void add_row(const Arm& arm, double b, double price) noexcept;
   void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
-  void add_joint_rows(const Arm& arm, double dt_s, bool last_resort) noexcept;
+  void add_joint_rows(const Arm& arm, double dt_s) noexcept;
   double acceleration_limit(const Arm& arm, int j) const noexcept;
   void add_torque_rows(const Arm& arm) noexcept;
 

@@ -110,7 +110,7 @@ bool Planner::Impl::guard(const Input& in, VectorXd& tau) noexcept {
   outcome = barrier.solve(arm, pairs, in.dt_s, qdd);
   if (outcome.infeasible) {
     qdd = -options.brake_rate * arm.qd;
-    (void)barrier.solve(arm, pairs, in.dt_s, qdd, true);
+    (void)barrier.solve(arm, pairs, in.dt_s, qdd);
   }
   if (outcome.active || outcome.infeasible) tau.noalias() = arm.coriolis + arm.M * qdd;
   return outcome.infeasible;
