@@ -45,6 +45,7 @@ TEST(Escape, LeadsOutOfALocalMinimum) {
   const RunResult with = run(e.robot, e.obstacles, e.options, e.goal, e.q0, 2e-3, 20);
   EXPECT_EQ(with.last.state, State::reached);
   EXPECT_GT(with.escapes, 0);
+  EXPECT_LT(with.stuck_at_s, 0);  // an arm that lags asks before it is stuck
   EXPECT_EQ(with.contact_at_s, -1);
 }
 
