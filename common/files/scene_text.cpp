@@ -10,8 +10,8 @@
 #include "common/files/text_fields.h"
 #include "common/files/urdf.h"
 #include "common/rbd/planar_chain.h"
-#include "common/scene/self_links.h"
 #include "common/scene/reduce.h"
+#include "common/scene/self_links.h"
 
 namespace hamel::files {
 namespace {

@@ -31,8 +31,8 @@ Problem failed(const std::string& path, const char* what) {
 }  // namespace
 
 struct Checkpoint::Slot {
-  std::uint32_t magic, layout, kind;
-  std::uint64_t checksum, sequence, size;
+  std::uint32_t magic, layout, kind, size;
+  std::uint64_t checksum, sequence;
   std::byte payload[1];
 };
 
@@ -111,7 +111,7 @@ bool Checkpoint::save(std::span<const std::byte> payload) noexcept {
   s->layout = kLayout;
   s->kind = kind_;
   s->sequence = sequence_;
-  s->size = payload.size();
+  s->size = static_cast<std::uint32_t>(payload.size());
   std::memcpy(s->payload, payload.data(), payload.size());
   s->checksum = checksum(s->payload, s->size, s->sequence);
   std::atomic_signal_fence(std::memory_order_seq_cst);
