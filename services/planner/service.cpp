@@ -253,7 +253,10 @@ void PlannerService::ask_escape(const Input& in) {
   escape_ = std::async(std::launch::async, [this, question = planner_.escape_question(in)] {
     return find_escape(scene_.robot, scene_.planner, question);
   });
-  spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
+  if (output_.report.state == State::stuck)
+    spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
+  else
+    spdlog::info("t = {:.3f} s: little progress; looking for a quicker way", in.t_s);
 }
 
 /// Lockstep waits for an answer that is due; real time takes it once it is there.
@@ -272,8 +275,10 @@ void PlannerService::take_escape() {
   if (escape.found)
     spdlog::info("t = {:.3f} s: waypoint {} leads out; goal expected in {:.1f} s", state_.t_s,
                  escape.rollouts, escape.reached_after_s);
-  else
+  else if (escape.rollouts > 0)
     spdlog::info("t = {:.3f} s: {} rollouts found no way out", state_.t_s, escape.rollouts);
+  else
+    spdlog::info("t = {:.3f} s: the way it goes leads to the goal", state_.t_s);
   planner_.take_escape(escape.waypoint, state_.t_s);
 }
 

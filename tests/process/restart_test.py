@@ -224,20 +224,17 @@ class Successor(unittest.TestCase):
 
 
 class Lockstep(unittest.TestCase):
-    LONG = ["--lockstep", "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", "12"]
+    LONG = ["--lockstep", "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", "60"]
 
     def test_a_planner_that_is_killed_in_the_middle_changes_nothing(self):
         for i, extra in enumerate(([], MIXED)):
             with self.subTest(extra):
                 _, here = outcome("run", scene("four_link_avoid"), *self.LONG)
                 with Up(scene("four_link_avoid"), *self.LONG, "--domain", 74 + i, *extra) as up:
-                    killed = 0
                     up.child("dynamics")
                     for _ in range(3):
                         time.sleep(0.4)
-                        if up.process.poll() is None:
-                            os.kill(up.child("planner"), signal.SIGKILL)
-                            killed += 1
+                        os.kill(up.child("planner"), signal.SIGKILL)
                     code, there, err = up.end()
                 self.assertEqual(there["trajectory_hash"], here["trajectory_hash"], err)
                 self.assertGreaterEqual(there["restarts"], 1, err)
