@@ -27,7 +27,7 @@ Vary read_vary(const text::Vary& m) {
 std::string fault(const Vary& v, bool random) {
   if (v.field.empty()) return "field is missing";
   const bool range = v.from && v.to;
-  if (range == !v.values.empty()) return "must have values, or from and to";
+  if (range == !v.values.empty() || bool(v.from) != bool(v.to)) return "must have values, or from and to";
   if (range && (!std::isfinite(*v.from) || !std::isfinite(*v.to))) return "from and to must be finite";
   if (range && !random && v.count < 2) return "count must be >= 2";
   return "";
@@ -63,6 +63,8 @@ Checked<BatchText> load_batch(const std::string& path) {
     product *= v.values.empty() ? v.count : static_cast<double>(v.values.size());
   }
   if (out.vary.empty()) found.push_back({path, "varies nothing"});
+  if (out.random > kMost)
+    found.push_back({path, "random = " + std::to_string(out.random) + " is more than 1e7 variations"});
   if (out.random == 0 && product > kMost) found.push_back({path, "is a grid of more than 1e7 variations"});
   if (!found.empty()) return found;
   return out;

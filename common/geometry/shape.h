@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 
 #include "common/lie/se3.h"
 
@@ -29,6 +30,8 @@ struct Obstacle {
   lie::Twist V_WO = lie::Twist::Zero();  ///< (omega, v) of the obstacle's origin, world axes [rad/s, m/s]
   bool velocity_known = true;            ///< false: V_WO means nothing
   double sigma_m = 0;                    ///< standard deviation of the position
+  /// When it was where X_WO says, on the run's clock [s]; NaN: as long ago as its set is old.
+  double seen_s = std::numeric_limits<double>::quiet_NaN();
 };
 
 }  // namespace hamel::geometry

@@ -30,9 +30,8 @@ namespace hamel::scene {
 ///              commands stay the same, reported distances are off.  Only where it is `on`
 ///   rate       bounded [m]: scripted obstacles are published no faster than carrying them on needs
 ///   cycle      bounded [m]: planner cycles no faster than needed for nothing to close in by more between
-///   two,
-///              at twice the speed that the end effector is drawn with and those of scripted obstacles (a
-///              singular start may be faster: explain measures it).  Only where it is `on`
+///              two, at twice the speed that the end effector is drawn with and those of scripted obstacles
+///              (a singular start may be faster: explain measures it).  Only where it is `on`
 ///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
 void reduce(Scene& s);
 

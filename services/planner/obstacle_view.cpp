@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/scene/reduce.h"
 
@@ -110,15 +111,18 @@ void ObstacleView::put_together() {
   near_is_old_ = true;
   ++sifts_;
   all_.clear();
-  for (const auto& [source, queue] : sources_)
-    if (current(queue))
-      all_.insert(all_.end(), queue.front().obstacles.begin(), queue.front().obstacles.end());
+  for (const auto& [source, queue] : sources_) {
+    if (!current(queue)) continue;
+    const std::size_t first = all_.size();
+    all_.insert(all_.end(), queue.front().obstacles.begin(), queue.front().obstacles.end());
+    for (std::size_t k = first; k < all_.size(); ++k) all_[k].seen_s = queue.front().t_s;
+  }
   if (!reach_) return;
-  reach_->sift(all_, kHorizon_s, kept_, floor_m_);
-  // What the planner would not see is not worth sifting.
-  std::erase_if(kept_, [this](const geometry::Obstacle& o) {
-    return scene::Reach::is_plain(o) && !in_reach(workspace_, o, options_);
+  seen_.clear();  // what the planner would not see culls nothing
+  std::copy_if(all_.begin(), all_.end(), std::back_inserter(seen_), [this](const geometry::Obstacle& o) {
+    return !scene::Reach::is_plain(o) || in_reach(workspace_, o, options_);
   });
+  reach_->sift(seen_, kHorizon_s, kept_, floor_m_);
   if (!merge_) return;
   if (!cull_) kept_ = all_;
   merge_->apply(*reach_, kHorizon_s, kept_);

@@ -70,7 +70,7 @@ class ObstacleView {
   bool cull_ = false, skip_links_ = false;
   bool changed_ = false;      ///< other sets hold than when all_ was put together
   bool near_is_old_ = false;  ///< near_ is of other sets
-  std::vector<geometry::Obstacle> all_, kept_, near_;
+  std::vector<geometry::Obstacle> all_, seen_, kept_, near_;
   std::vector<double> floor_m_;
   std::span<const geometry::Obstacle> shown_;
   std::span<const double> floor_shown_;

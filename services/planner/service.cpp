@@ -250,13 +250,21 @@ void PlannerService::plan(Time now) {
 void PlannerService::ask_escape(const Input& in) {
   escape_asked_ = in.step;
   escape_due_ = in.step + planner_.escape_steps(state_.dt_s);
+  forget_escape();
+  escape_stop_ = false;
   escape_ = std::async(std::launch::async, [this, question = planner_.escape_question(in)] {
-    return find_escape(scene_.robot, scene_.planner, question);
+    return find_escape(scene_.robot, scene_.planner, question, &escape_stop_);
   });
   if (output_.report.state == State::stuck)
     spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
   else
     spdlog::info("t = {:.3f} s: little progress; looking for a quicker way", in.t_s);
+}
+
+/// Ends a question that nobody waits for any more, in the time of one rollout's cycle.
+void PlannerService::forget_escape() {
+  escape_stop_ = true;
+  escape_ = {};
 }
 
 /// Lockstep waits for an answer that is due; real time takes it once it is there.

@@ -2,6 +2,7 @@
 /// The planner service in its shell: states, obstacles, goals and modes in, commands and reports out.
 
 #include <algorithm>
+#include <atomic>
 #include <future>
 #include <memory>
 #include <optional>
@@ -45,6 +46,7 @@ class PlannerService final : public runtime::Service {
   void take_obstacles();
   void meet(const wire::ArmState& s);
   bool leaps(const wire::ArmState& s, Time now);
+  void forget_escape();
   bool answer(Time now);
   void plan(Time now);
   void ask_escape(const Input& in);
@@ -92,6 +94,7 @@ class PlannerService final : public runtime::Service {
   Time last_state_{}, last_report_{}, last_silence_{}, last_sync_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
+  std::atomic<bool> escape_stop_ = false;  ///< before escape_: outlives the question
   std::future<Escape>
       escape_;  ///< valid: a question is out, asked at escape_asked_, its answer due at escape_due_
   std::uint64_t escape_asked_ = 0, escape_due_ = 0;

@@ -264,6 +264,18 @@ wire::ObstacleSet set(double t_s, double next_t_s, std::uint32_t source = 1, std
   return s;
 }
 
+// Two cameras at different rates: what each saw keeps its own time, on which its speed is made out.
+TEST(ObstacleView, EachObstacleIsAsOldAsItsOwnSet) {
+  planner::ObstacleView v;
+  v.add(set(0.1, 0.2, 1));
+  v.add(set(0.15, 0.25, 2));
+  wire::Causes causes;
+  EXPECT_DOUBLE_EQ(v.at(0.18, Eigen::VectorXd::Zero(4), causes), 0.18 - 0.1);
+  ASSERT_EQ(v.obstacles().size(), 2u);
+  EXPECT_EQ(v.obstacles()[0].seen_s, 0.1);
+  EXPECT_EQ(v.obstacles()[1].seen_s, 0.15);
+}
+
 TEST(ObstacleView, WaitsForTheSetThatCoversATime) {
   planner::ObstacleView v;
   EXPECT_FALSE(v.covers(0));

@@ -205,6 +205,20 @@ TEST(States, AGoalInsideWhatStandsIsSaidAtOnceAndNotTriedUntilThatIsGone) {
   EXPECT_EQ(b.go(30).last.state, State::reached);
 }
 
+// A base that reaches farther than the arm does.
+TEST(States, WhatRunsIntoTheBaseIsToldWhereverItIs) {
+  Bench b;
+  scene::LinkShape pedestal;
+  pedestal.link = -1;
+  pedestal.shape = {geometry::ShapeKind::sphere, {0.5, 0, 0}};
+  pedestal.X_LS.p = {0, 0, -6};
+  b.robot.shapes.push_back(pedestal);
+  b.obstacles = {sphere(1, {0.6, 0, -6}, 0.2, {-0.1, 0, 0})};
+  const Output out = b.plan();
+  expect(out, State::unsafe, Reason::contact);
+  EXPECT_NE(std::string(out.report.detail).find("base"), std::string::npos);
+}
+
 TEST(States, BlockedGoalIsNamed) {
   Bench b;
   b.options.unreachable = scene::Unreachable::approach;

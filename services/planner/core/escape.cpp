@@ -1,5 +1,6 @@
 #include "services/planner/core/escape.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -46,14 +47,15 @@ VectorXd draw_waypoint(const model::Chain& chain, const VectorXd& q, double spre
 /// The planner and a model of the arm, stepped together.
 class Rollout {
  public:
-  Rollout(const scene::Robot& robot, const Options& options)
+  Rollout(const scene::Robot& robot, const Options& options, const std::atomic<bool>* stop)
       : options_(without_escapes(options)),
         robot_(robot),
         planner_(robot, options_),
         out_(planner_.output()),
         chain_(weightless(robot.chain)),
         ws_(chain_),
-        qdd_(VectorXd::Zero(chain_.n())) {}
+        qdd_(VectorXd::Zero(chain_.n())),
+        stop_(stop) {}
 
   struct Ending {
     bool reached = false;
@@ -68,7 +70,7 @@ class Rollout {
     qd_ = from.qd;
     obstacles_ = from.obstacles;
     const int steps = static_cast<int>(most_s / kStep_s);
-    for (int k = 0; k < steps; ++k) {
+    for (int k = 0; k < steps && !stopped(); ++k) {
       const double t_s = k * kStep_s;
       planner_.plan({.step = static_cast<std::uint64_t>(k),
                      .t_s = t_s,
@@ -93,6 +95,7 @@ class Rollout {
     o.ramp_s = 0;
     return o;
   }
+  bool stopped() const noexcept { return stop_ && stop_->load(std::memory_order_relaxed); }
   static model::Chain weightless(const model::Chain& chain) {
     model::ChainSpec spec = chain.spec();
     spec.gravity_W_mps2.setZero();
@@ -114,17 +117,22 @@ class Rollout {
   rbd::Workspace ws_;
   VectorXd q_, qd_, qdd_;
   std::vector<geometry::Obstacle> obstacles_;
+  const std::atomic<bool>* stop_;
 };
 
 }  // namespace
 
-Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question) {
+Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question,
+                   const std::atomic<bool>* stop) {
   Escape escape;
   if (question.q.size() != robot.chain.n() || question.q.size() > static_cast<Eigen::Index>(kMaxWaypoint))
     return escape;
   EscapeQuestion from = question;
   from.goal.X_WG.p += from.goal_age_s * from.goal.V_WG.tail<3>();
-  Rollout rollout(robot, options);
+  const Eigen::Vector3d turned = from.goal_age_s * from.goal.V_WG.head<3>();
+  from.goal.X_WG.R =
+      Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()).toRotationMatrix() * from.goal.X_WG.R;
+  Rollout rollout(robot, options, stop);
   Dice dice(question.step * 0x2545f4914f6cdd1dull + question.tries);
   double most_s = options.escape_horizon_s;
   if (!question.stuck && rollout.run(from, {}, most_s).reached) return escape;
@@ -133,6 +141,7 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
     const VectorXd waypoint = draw_waypoint(robot.chain, question.q, spread, dice);
     const Rollout::Ending ending = rollout.run(from, waypoint, most_s);
     ++escape.rollouts;
+    if (stop && *stop) return {};
     if (!ending.reached) continue;
     escape.found = true;
     escape.waypoint = waypoint;

@@ -6,6 +6,7 @@
 /// tens of milliseconds: never for the control thread.
 
 #include <Eigen/Core>
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -36,6 +37,8 @@ struct Escape {
 /// Rolls out `options.escape_rollouts` random waypoints, `escape_horizon_s` each, at 10 ms a cycle; of the
 /// runs that reach the goal without contact the quickest wins.  None does: not found.  An arm that is not
 /// stuck and reaches its goal as it goes needs none: not found either.
-Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question);
+/// @param stop  may be null; once true the answer is: not found
+Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question,
+                   const std::atomic<bool>* stop = nullptr);
 
 }  // namespace hamel::planner

@@ -34,7 +34,8 @@ double gate(const scene::PlannerOptions& o, const Eigen::Vector3d& n, double d,
 
 /// The scalar k of w = k e; 0 beyond rho0, when receding and at rest.
 ///   F1, F2, F3: kobs G(phi) / d / (1 + exp(d - rho0)), Eq. (20); G = exp(phi)-1, exp(1/max(phi, phi_min)),
-///   exp(phi-1) S:          kobs (n.v) / d S(1 - d/rho0) S(c/c0), c = n.v/|v|; planner.md 1.4
+///                exp(phi-1)
+///   S:           kobs (n.v) / d S(1 - d/rho0) S(c/c0), c = n.v/|v|; planner.md 1.4
 double gyro_gain(const scene::PlannerOptions& o, scene::GainForm form, const Eigen::Vector3d& n, double d,
                  const Eigen::Vector3d& v) noexcept;
 

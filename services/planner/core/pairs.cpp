@@ -74,6 +74,10 @@ bool estimate(Memory& m, const geometry::Obstacle& o, double stamp_s, Vector3d& 
 Workspace workspace(const scene::Robot& robot) {
   const model::Chain& chain = robot.chain;
   Workspace out{chain.X_WB0() * chain.joint(0).X_PJ.p, 0};
+  for (const scene::LinkShape& s : robot.shapes)
+    if (s.link < 0)
+      out.radius_m = std::max(out.radius_m, (chain.X_WB0() * s.X_LS.p - out.centre_W).norm() +
+                                                geometry::solid(s.shape, {}).bound_m);
   double reach = 0;  // of a link's frame
   for (int i = 0; i < chain.n(); ++i) {
     const model::Joint& joint = chain.joint(i);
@@ -139,7 +143,7 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
     if (!s.velocity_known) {
       item.now.V_WO.setZero();
       Vector3d velocity;
-      if (estimate(memory, s, t_s - age, velocity)) {
+      if (estimate(memory, s, std::isfinite(s.seen_s) ? s.seen_s : t_s - age, velocity)) {
         item.now.V_WO.tail<3>() = velocity;
         ++estimated_;
       } else {

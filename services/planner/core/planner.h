@@ -104,8 +104,8 @@ struct Report {
   int pairs_dropped = 0;                    ///< in range but beyond kMaxPairs: the farthest ones
   int barrier_rows = 0, barrier_steps = 0;  ///< rows seen, steps of its active set
   int velocities_estimated = 0, velocities_unknown = 0;  ///< obstacles that do not tell theirs
-  /// Stuck, and a way out may be found: ask find_escape() about this cycle's input with this many tries and
-  /// tell take_escape() what it says.  Asked once; then `escape_waiting` until it is told.
+  /// Stuck, or lagging, and a way out may be found: ask find_escape() about this cycle's input with this many
+  /// tries and tell take_escape() what it says.  Asked once; then `escape_waiting` until it is told.
   bool escape_asked = false, escape_waiting = false;
   std::uint64_t escapes = 0;      ///< questions so far at this goal
   std::vector<LinkReport> links;  ///< n, from base to tip

@@ -43,6 +43,7 @@ struct Planner::Impl {
   void circulate(const Input& in, Eigen::VectorXd& tau) noexcept;
   double open_tank(double dt_s) noexcept;
   bool guard(const Input& in, Eigen::VectorXd& tau) noexcept;
+  double braking_rate(double dt_s) const noexcept;
   void brake(double dt_s, Eigen::VectorXd& tau) const noexcept;
   void report(const Verdict& verdict, Report& out) noexcept;
   double slow_down(const Input& in) const noexcept;

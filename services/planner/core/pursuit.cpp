@@ -28,7 +28,8 @@ void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
     goal_reachable = true;
     beyond_W.setZero();
   } else if (!same || !looked) {
-    const Reach found = reach(arm.chain, wanted, options);
+    const bool moved = looked && wanted.id == memory.goal_id && wanted.kind == sought.kind;
+    const Reachability found = reachability(arm.chain, wanted, options, moved ? &arm.q : nullptr);
     goal_reachable = found.reachable;
     beyond_W = found.reachable ? Vector3d(Vector3d::Zero()) : Vector3d(wanted.X_WG.p - found.nearest_W);
     looked = true;
@@ -59,7 +60,8 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
                      (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
     now.target_blocked = target_is_blocked = !joints && target_blocked(false);
     const bool rejects = options.method == Method::gyro && options.unreachable == scene::Unreachable::reject;
-    refused = now.target_blocked && rejects && goal.V_WG.isZero(0) && target_blocked(true);
+    refused =
+        now.target_blocked && rejects && !now.out_of_reach && goal.V_WG.isZero(0) && target_blocked(true);
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
     const bool rollouts = options.method == Method::gyro && options.escapes > 0;
     const std::uint64_t flips = rollouts ? 1 : kFlips;

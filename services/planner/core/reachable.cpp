@@ -14,6 +14,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
+constexpr int kFewStarts = 4;
 constexpr int kStarts = 100, kSteps = 80;
 constexpr double kTurn_m = 0.3;  // so much of a place a radian is worth
 
@@ -113,13 +114,15 @@ class Search {
 
 }  // namespace
 
-Reach reach(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& o) {
+Reachability reachability(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& o,
+                          const VectorXd* near) {
   if (goal.kind == scene::GoalKind::joints) return {};
   Search search(chain, goal);
-  Reach out{false, Vector3d::Zero()};
+  Reachability out{false, Vector3d::Zero()};
   double least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < kStarts; ++k) {
-    VectorXd q = search.start(k);
+  const bool begin = near && near->size() == chain.n() && near->allFinite();
+  for (int k = begin ? -1 : 0; k < (begin ? kFewStarts : kStarts); ++k) {
+    VectorXd q = k < 0 ? *near : search.start(k);
     const Vector6d e = search.descend(q);
     if (e.tail<3>().norm() <= 0.5 * o.goal_tolerance_m &&
         e.head<3>().norm() <= 0.5 * kTurn_m * o.goal_tolerance_rad)

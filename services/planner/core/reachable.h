@@ -7,7 +7,7 @@
 
 namespace hamel::planner {
 
-struct Reach {
+struct Reachability {
   bool reachable = true;
   Eigen::Vector3d nearest_W = Eigen::Vector3d::Zero();  ///< position of the end effector that comes nearest
 };
@@ -17,7 +17,10 @@ struct Reach {
 ///
 /// "Not reachable" is a search that failed, no proof; of 2,000 goals that are reachable by construction none
 /// was refused (a test).  Takes 0.1 ms where it is, some milliseconds where it is not: for new goals, not for
-/// cycles. Allocates.
-Reach reach(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& options);
+/// cycles.  Allocates.
+/// @param near  may be null; else a configuration the arm is close to: the search begins there and tries few
+///              others, for targets that move on
+Reachability reachability(const model::Chain& chain, const scene::Goal& goal,
+                          const scene::PlannerOptions& options, const Eigen::VectorXd* near = nullptr);
 
 }  // namespace hamel::planner

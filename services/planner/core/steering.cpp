@@ -109,7 +109,7 @@ bool Planner::Impl::guard(const Input& in, VectorXd& tau) noexcept {
   arm.M_llt.solveInPlace(qdd);
   outcome = barrier.solve(arm, pairs, in.dt_s, qdd);
   if (outcome.infeasible) {
-    qdd = -options.brake_rate * arm.qd;
+    qdd = braking_rate(in.dt_s) * arm.qd;
     (void)barrier.solve(arm, pairs, in.dt_s, qdd);
   }
   if (outcome.active || outcome.infeasible) tau.noalias() = arm.coriolis + arm.M * qdd;
@@ -117,9 +117,13 @@ bool Planner::Impl::guard(const Input& in, VectorXd& tau) noexcept {
 }
 
 // qdd = -bmax qd, exact over the period: qd falls to exp(-bmax dt) of itself, whatever dt.
-void Planner::Impl::brake(double dt_s, VectorXd& tau) const noexcept {
+double Planner::Impl::braking_rate(double dt_s) const noexcept {
   const double dt = std::isfinite(dt_s) ? std::max(dt_s, kLeastPeriod_s) : 1e-3;
-  tau.noalias() = arm.M * (std::expm1(-options.brake_rate * dt) / dt * arm.qd);
+  return std::expm1(-options.brake_rate * dt) / dt;
+}
+
+void Planner::Impl::brake(double dt_s, VectorXd& tau) const noexcept {
+  tau.noalias() = arm.M * (braking_rate(dt_s) * arm.qd);
   tau += arm.coriolis;
 }
 
