@@ -9,6 +9,7 @@
 #include "clients/hamel/batch.h"
 #include "clients/hamel/chosen.h"
 #include "clients/hamel/journal.h"
+#include "clients/hamel/outputs.h"
 #include "clients/hamel/progress.h"
 #include "clients/hamel/variations.h"
 #include "common/files/scene_text.h"
@@ -142,6 +143,12 @@ int batch(const BatchArgs& args) {
     return runtime::complain("hamel batch", {{args.path, "names no scene; give one with --scene"}});
   o.overrides = v.set();
   o.overrides.insert(o.overrides.end(), args.overrides.begin(), args.overrides.end());
+  for (const std::string& set : args.overrides)
+    for (const std::string& field : v.fields())
+      if (set.substr(0, set.find('=')) == field)
+        return runtime::complain("hamel batch", {{"--set " + set, "varies in " + args.path}});
+  if (const auto p = output_problem("-o", args.out_path, {args.path, o.scene_path}))
+    return runtime::complain("hamel batch", {*p});
   const auto scene = load_chosen(o);
   if (!scene) return runtime::complain("hamel batch", scene.error());
 

@@ -11,6 +11,7 @@
 #include "clients/hamel/bench_output.h"
 #include "clients/hamel/bench_streams.h"
 #include "clients/hamel/gnuplot.h"
+#include "clients/hamel/outputs.h"
 #include "clients/hamel/problems.h"
 #include "clients/hamel/progress.h"
 #include "common/files/scene_text.h"
@@ -82,6 +83,11 @@ Checked<Plan> make_plan(const BenchArgs& args) {
       found.insert(found.end(), chosen.error().begin(), chosen.error().end());
   }
   plan.model = args.model == "full" ? ArmModel::full : ArmModel::prototype;
+  for (const auto& [option, path] : {std::pair{"--csv", args.csv_path}, {"--plot", args.plot_path}})
+    if (const auto p = output_problem(option, path, {})) found.push_back(*p);
+  for (const std::string& o : args.overrides)
+    if (o.substr(o.find('.') + 1).starts_with("method"))
+      found.push_back({"--set " + o, "methods are chosen by --methods"});
   if (!args.plot_path.empty())
     if (const auto p = check_picture_name(args.plot_path)) found.push_back(*p);
   if (!found.empty()) return found;
@@ -192,6 +198,7 @@ int bench_planner(const BenchArgs& args) {
     if (const auto p =
             draw_rates(args.plot_path, fmt::format("hamel bench planner, seed {}", args.seed), all))
       return runtime::complain("hamel bench", {*p});
+  if (interrupted) fmt::print(stderr, "interrupted: these are the scenes that were done\n");
   return interrupted ? runtime::kInterrupted : runtime::kDone;
 }
 
@@ -232,7 +239,14 @@ BenchVerb::BenchVerb(CLI::App& app) {
       ->check(CLI::IsMember({"prototype", "full"}))
       ->capture_default_str();
   planner_->add_option("--dt", args_.dt_s, "step of arm and planner")
-      ->check(CLI::Range(1e-5, 0.05))
+      ->check(CLI::Range(1e-5, 0.05) & CLI::Validator(
+                                           [](const std::string& text) {
+                                             double v = 0;
+                                             return CLI::detail::lexical_cast(text, v) && v == v
+                                                        ? ""
+                                                        : "NaN is no step";
+                                           },
+                                           "", "number"))
       ->type_name("SECONDS")
       ->capture_default_str();
   planner_->add_flag("--velocity-unknown", args_.velocities_unknown,

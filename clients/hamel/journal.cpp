@@ -19,7 +19,9 @@ std::string all_of(const std::string& path) {
 
 Result<std::unique_ptr<Journal>, Problem> Journal::open(const std::string& path, const std::string& job,
                                                         const std::string& header) {
-  if (std::filesystem::is_directory(path)) return Problem{path, "is a folder"};
+  std::error_code none;
+  if (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none))
+    return Problem{path, "is no ordinary file"};
   std::unique_ptr<Journal> j(new Journal);
   j->path_ = path;
   j->head_ = "# " + job + "\n";
@@ -30,6 +32,9 @@ Result<std::unique_ptr<Journal>, Problem> Journal::open(const std::string& path,
     for (std::size_t end; (end = old.find('\n', from)) != std::string::npos; from = end + 1)
       j->kept_.push_back(old.substr(from, end - from));
     keep = old.substr(0, from);
+  } else if (old.starts_with("# ")) {
+    return Problem{partial, "is of another batch (" + old.substr(2, old.find('\n') - 2) +
+                                "): remove it, or write elsewhere"};
   }
   j->file_ = std::fopen(partial.c_str(), "wb");
   const bool written = j->file_ && std::fwrite(keep.data(), 1, keep.size(), j->file_) == keep.size();

@@ -14,8 +14,8 @@ namespace hamel::client {
 /// Writes to PATH.partial, whose first line names the job, and becomes PATH when it is finished.
 class Journal {
  public:
-  /// Opens PATH.partial and keeps the whole rows of an earlier, unfinished run of the same job; begins anew
-  /// where there is none, or it is of another job.
+  /// Opens PATH.partial and keeps the whole rows of an earlier, unfinished run of the same job.  Refuses a
+  /// PATH that is no ordinary file, and a PATH.partial of another job.
   static Result<std::unique_ptr<Journal>, Problem> open(const std::string& path, const std::string& job,
                                                         const std::string& header);
   ~Journal();

@@ -2,6 +2,7 @@
 
 #include "clients/hamel/chosen.h"
 #include "clients/hamel/commands.h"
+#include "clients/hamel/outputs.h"
 #include "clients/hamel/print.h"
 #include "clients/hamel/recorder.h"
 #include "common/runtime/log.h"
@@ -34,6 +35,9 @@ int run(const RunArgs& asked) {
   if (!scene) return runtime::complain("hamel run", scene.error());
   const scene::Scene& s = scene.value();
   for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);
+  for (const auto& [option, path] : {std::pair{"--csv", args.csv_path}, {"--record", args.record_path}})
+    if (const auto p = output_problem(option, path, {args.run.scene_path}))
+      return runtime::complain("hamel run", {*p});
   auto node = runtime::open_node(args.run.bus, "inproc", "hamel-run");
   if (!node) return runtime::complain("hamel run", {node.error()});
   bus::Node& n = *node.value();

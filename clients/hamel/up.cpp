@@ -4,6 +4,7 @@
 
 #include "clients/hamel/chosen.h"
 #include "clients/hamel/commands.h"
+#include "clients/hamel/outputs.h"
 #include "clients/hamel/print.h"
 #include "clients/hamel/recorder.h"
 #include "clients/hamel/run_folder.h"
@@ -98,6 +99,9 @@ int up(const RunArgs& asked) {
   if (!scene) return runtime::complain("hamel up", scene.error());
   const scene::Scene& s = scene.value();
   for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);
+  for (const auto& [option, path] : {std::pair{"--csv", args.csv_path}, {"--record", args.record_path}})
+    if (const auto p = output_problem(option, path, {args.run.scene_path}))
+      return runtime::complain("hamel up", {*p});
   auto node = runtime::open_node(args.run.bus, s.bus.dynamics, "hamel-up");
   if (!node) return runtime::complain("hamel up", {node.error()});
   bus::Node& n = *node.value();

@@ -134,6 +134,24 @@ class Batch(unittest.TestCase):
             self.assertIn("going on after", err)
         self.assertEqual(out.read_bytes(), whole)
 
+    def test_nothing_that_is_read_or_of_another_batch_is_written_over(self):
+        grid = self.path / "grid.textproto"
+        code, _, err = hamel("batch", grid, "-o", grid)
+        self.assertEqual(code, 2, err)
+        self.assertIn("which is read", err)
+        os.mkfifo(self.path / "pipe")
+        code, _, err = hamel("batch", grid, "-o", self.path / "pipe")
+        self.assertEqual(code, 2, err)
+        self.assertIn("no ordinary file", err)
+        (self.path / "o.csv.partial").write_text("# hamel batch of something else\nvariation\n0\n")
+        code, _, err = hamel("batch", grid, "-o", self.path / "o.csv")
+        self.assertEqual(code, 2, err)
+        self.assertIn("something else", err)
+        self.assertTrue((self.path / "o.csv.partial").read_text().endswith("0\n"))
+        code, _, err = hamel("batch", grid, "--set", "planner.kobs=3")
+        self.assertEqual(code, 2, err)
+        self.assertIn("varies", err)
+
     def test_random_variations_and_tables_are_read(self):
         (self.path / "random.textproto").write_text(
             f'scene: "{scene("four_link_avoid")}" random: 4 seed: 7 set: "duration_s=0.2"\n'

@@ -95,6 +95,26 @@ class FourLink(unittest.TestCase):
         self.assertNotIn(other["trajectory_hash"], hashes)
 
 
+class Outputs(unittest.TestCase):
+    def test_what_is_read_is_not_written_over(self):
+        for verb in ("run", "up"):
+            for option in ("--csv", "--record"):
+                code, _, err = hamel(verb, scene("four_link_avoid"), option, scene("four_link_avoid"))
+                self.assertEqual(code, 2, err)
+                self.assertIn("which is read", err)
+        for option in ("--csv", "--plot"):
+            code, _, err = hamel("bench", "planner", "--scenes", 1, option, "/no/such/folder/x.svg")
+            self.assertEqual(code, 2, err)
+            self.assertIn("/no/such/folder", err)
+        for wrong in (["--dt", "nan"], ["--set", "planner.method=gyro"]):
+            code, _, err = hamel("bench", "planner", "--scenes", 1, "--family", "planar_static", *wrong)
+            self.assertNotEqual(code, 0, err)
+
+    def test_a_planner_that_overflows_is_unsafe_and_heard(self):
+        code, o = outcome("run", scene("four_link_avoid"), "--set", "planner.kp=1e308", "--duration", "0.1")
+        self.assertEqual((code, o["outcome"]), (1, "UNSAFE"), o)
+
+
 class Panda(unittest.TestCase):
     def test_reaches_past_three_spheres(self):
         code, o = outcome("run", scene("panda_reach"))
