@@ -253,7 +253,7 @@ void PlannerService::ask_escape(const Input& in) {
   forget_escape();
   escape_stop_ = false;
   escape_ = std::async(std::launch::async, [this, question = planner_.escape_question(in)] {
-    return find_escape(scene_.robot, scene_.planner, question, &escape_stop_);
+    return find_escape(scene_.robot, scene_.planner, question, [this] { return escape_stop_.load(); });
   });
   if (output_.report.state == State::stuck)
     spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));

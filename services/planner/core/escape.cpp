@@ -47,7 +47,7 @@ VectorXd draw_waypoint(const model::Chain& chain, const VectorXd& q, double spre
 /// The planner and a model of the arm, stepped together.
 class Rollout {
  public:
-  Rollout(const scene::Robot& robot, const Options& options, const std::atomic<bool>* stop)
+  Rollout(const scene::Robot& robot, const Options& options, const std::function<bool()>& stop)
       : options_(without_escapes(options)),
         robot_(robot),
         planner_(robot, options_),
@@ -95,7 +95,7 @@ class Rollout {
     o.ramp_s = 0;
     return o;
   }
-  bool stopped() const noexcept { return stop_ && stop_->load(std::memory_order_relaxed); }
+  bool stopped() const noexcept { return stop_ && stop_(); }
   static model::Chain weightless(const model::Chain& chain) {
     model::ChainSpec spec = chain.spec();
     spec.gravity_W_mps2.setZero();
@@ -117,13 +117,13 @@ class Rollout {
   rbd::Workspace ws_;
   VectorXd q_, qd_, qdd_;
   std::vector<geometry::Obstacle> obstacles_;
-  const std::atomic<bool>* stop_;
+  const std::function<bool()>& stop_;
 };
 
 }  // namespace
 
 Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question,
-                   const std::atomic<bool>* stop) {
+                   const std::function<bool()>& stop) {
   Escape escape;
   if (question.q.size() != robot.chain.n() || question.q.size() > static_cast<Eigen::Index>(kMaxWaypoint))
     return escape;
@@ -141,7 +141,7 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
     const VectorXd waypoint = draw_waypoint(robot.chain, question.q, spread, dice);
     const Rollout::Ending ending = rollout.run(from, waypoint, most_s);
     ++escape.rollouts;
-    if (stop && *stop) return {};
+    if (stop && stop()) return {};
     if (!ending.reached) continue;
     escape.found = true;
     escape.waypoint = waypoint;

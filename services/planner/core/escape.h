@@ -6,8 +6,8 @@
 /// tens of milliseconds: never for the control thread.
 
 #include <Eigen/Core>
-#include <atomic>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "services/planner/core/planner.h"
@@ -37,8 +37,8 @@ struct Escape {
 /// Rolls out `options.escape_rollouts` random waypoints, `escape_horizon_s` each, at 10 ms a cycle; of the
 /// runs that reach the goal without contact the quickest wins.  None does: not found.  An arm that is not
 /// stuck and reaches its goal as it goes needs none: not found either.
-/// @param stop  may be null; once true the answer is: not found
+/// @param stop  asked in each cycle of a rollout; once it says true the answer is: not found
 Escape find_escape(const scene::Robot& robot, const Options& options, const EscapeQuestion& question,
-                   const std::atomic<bool>* stop = nullptr);
+                   const std::function<bool()>& stop = {});
 
 }  // namespace hamel::planner
