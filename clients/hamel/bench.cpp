@@ -126,6 +126,7 @@ std::vector<Trial> try_scene(const BenchArgs& args, const Plan& plan, std::size_
   s.dynamics.dt_s = args.dt_s;
   TrialOptions o;
   o.velocities_known = !args.velocities_unknown;
+  o.latency_s = args.latency_s;
   o.now_s = now_s;
   o.stop = stop;
   std::vector<Trial> out;
@@ -142,6 +143,7 @@ std::string settings_text(const BenchArgs& args) {
                         {"model", args.model},
                         {"dt_s", args.dt_s},
                         {"velocities_known", !args.velocities_unknown},
+                        {"latency_s", args.latency_s},
                         {"set", args.overrides}}
       .dump();
 }
@@ -249,6 +251,9 @@ BenchVerb::BenchVerb(CLI::App& app) {
                                            "", "number"))
       ->type_name("SECONDS")
       ->capture_default_str();
+  planner_->add_option("--latency", args_.latency_s, "age of what the planner is told of the obstacles")
+      ->check(CLI::Range(0.0, 10.0))
+      ->type_name("SECONDS");
   planner_->add_flag("--velocity-unknown", args_.velocities_unknown,
                      "the planner is not told how obstacles move");
   planner_->add_option("--jobs", args_.jobs, "threads; the result does not depend on them")

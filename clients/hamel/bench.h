@@ -19,6 +19,7 @@ struct BenchArgs {
   std::string model = "prototype";
   double dt_s = 0.002;
   bool velocities_unknown = false;
+  double latency_s = 0;
   int jobs = 0;  ///< threads; 0: one a processor
   std::vector<std::string> overrides;
   std::string csv_path, plot_path;

@@ -211,7 +211,7 @@ scene::Scene draw_example_5_2(const scene::Robot& robot, std::uint64_t seed) {
   Dice dice(seed);
   Judge judge(robot);
   scene::Scene s = empty_scene(robot);
-  s.duration_s = 20;
+  s.duration_s = 40;
   s.q0 = VectorXd::Zero(robot.chain.n());
   scene::ScriptedObstacle o;
   o.at_start.id = 1;
@@ -337,6 +337,7 @@ scene::PlannerOptions settings(const Cell& cell, Method method) {
     o.rho0_m = 0.2;
     o.eta = 0.0002;
     o.dmin_m = 0.008;
+    o.barrier_gain = 12;
     o.kc = 1;
     o.limit_weight = 100;
   }

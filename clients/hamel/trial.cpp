@@ -75,8 +75,8 @@ class Senses {
   }
   void look(double t_s) {
     if (options_.perfect_perception) {
-      source_.at(t_s, seen_);
-      age_s = 0;
+      age_s = std::min(options_.latency_s, t_s);
+      source_.at(t_s - age_s, seen_);
     } else {
       while (next_s_ <= t_s + 1e-12) {
         if (source_.at(next_s_, seen_)) stamp_s_ = next_s_;

@@ -37,6 +37,7 @@ struct TrialOptions {
   /// Obstacles are known at every cycle as they are then; else only at the set times of perception.
   bool perfect_perception = true;
   bool velocities_known = true;
+  double latency_s = 0;  ///< what the planner is told is so old, and it is told so (perfect perception)
   /// Not empty: one after the other for ever, each given up after 20 s; contacts are counted and do not end
   /// the trial.  Else the scene's goal alone.
   std::vector<scene::Goal> cycle = {};
