@@ -17,15 +17,17 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr auto kPatience = 5s;
+constexpr auto kAnyPlanner = 1s;  // a planner says something ten times a second
 
 Result<std::unique_ptr<bus::Node>, Problem> client_node(const runtime::BusOptions& o) {
   return runtime::open_node(o, "", "hamel-client");
 }
 
-/// Takes from `sub` until `wanted` holds; false after kPatience.
+/// Takes from `sub` until `wanted` holds; false after `patience`.
 template <class T, class Wanted>
-bool wait_for(bus::Node& node, wire::Subscription<T>& sub, T& m, Wanted wanted) {
-  const auto deadline = Clock::now() + kPatience;
+bool wait_for(bus::Node& node, wire::Subscription<T>& sub, T& m, Wanted wanted,
+              Clock::duration patience = kPatience) {
+  const auto deadline = Clock::now() + patience;
   do {
     while (sub.take(m))
       if (wanted(m)) return true;
@@ -99,6 +101,7 @@ int mode(const ModeArgs& args) {
   bus::Node& n = *node.value();
   wire::Publisher<wire::ModeCommand> out(n);
   wire::Subscription<wire::ArmState> states(n);
+  wire::Subscription<wire::PlannerReport> reports(n);
   wire::ArmState s;
   if (!wait_for(n, states, s, [&](const auto& m) { return m.arm == args.arm; }))
     return nobody(args.mode.c_str(), "arm", args.bus);
@@ -117,6 +120,13 @@ int mode(const ModeArgs& args) {
     return m.validity == wire::Validity::valid || m.validity == wire::Validity::command_stale;
   };
   if (!wait_for(n, states, s, obeyed)) return nobody(args.mode.c_str(), "arm", args.bus);
+  // A writer that leaves takes what is not yet delivered with it: the planner must have it, too, if there is
+  // one.
+  wire::PlannerReport r;
+  const auto ours = [&](const auto& m) { return m.arm == args.arm; };
+  if (wait_for(n, reports, r, ours, kAnyPlanner) && r.mode_id < c.id &&
+      !wait_for(n, reports, r, [&](const auto& m) { return ours(m) && m.mode_id >= c.id; }))
+    return nobody(args.mode.c_str(), "planner", args.bus);
   fmt::print("arm {}: {} at t = {:.3f} s\n", s.arm, wire::to_string(s.validity), s.t_s);
   return runtime::kDone;
 }

@@ -157,6 +157,7 @@ void layout(A& a, M& m) {
   a.text("detail", m.detail, kMaxName);
   a.text("method", m.method, kMaxName);
   a.integer("goal_id", m.goal_id);
+  a.integer("mode_id", m.mode_id);
   a.real("target_error_m", m.target_error_m);
   a.real("orientation_error_rad", m.orientation_error_rad);
   a.real("speed_mps", m.speed_mps);

@@ -134,7 +134,7 @@ struct PlannerReport {
   PlannerState state = PlannerState::idle;
   Reason reason = Reason::none;
   std::string detail, method;
-  std::uint64_t goal_id = 0;
+  std::uint64_t goal_id = 0, mode_id = 0;
   double target_error_m = 0, orientation_error_rad = 0, speed_mps = 0;
   Eigen::Vector3d end_effector_m = Eigen::Vector3d::Zero();
   double clearance_m = kInf, clearance_min_m = kInf;

@@ -30,7 +30,7 @@ Arm::Arm(const scene::Scene& scene)
       ws_(scene.robot.chain) {
   const model::Chain& chain = integrator_.chain();
   const int n = chain.n();
-  tau_ = tau_hold_ = tau_gravity_ = pull_ = Eigen::VectorXd::Zero(n);
+  tau_ = applied_ = tau_hold_ = tau_gravity_ = pull_ = Eigen::VectorXd::Zero(n);
   q_hold_ = state_.q;
   gravity_works_ = gravity_works(integrator_, state_.q);
   scale_J_ = gravity_works_ ? rbd::energy_scale(chain) : 0;
@@ -79,6 +79,7 @@ bool Arm::advance(const Drive& drive) noexcept {
   drive_torque(drive);
   report_ = integrator_.step(state_, tau_);
   if (!report_.usable()) return false;
+  applied_ = integrator_.torque_applied();
   books_.work_J += report_.work_J;
   books_.energy_J = integrator_.energy(state_);
   books_.drift_J =
@@ -100,7 +101,7 @@ double Arm::energy_drift_rel() const noexcept {
 void Arm::restore(const State& state, const Books& books, const Eigen::VectorXd& applied,
                   const Eigen::VectorXd* held) {
   state_ = state;
-  tau_ = applied;
+  applied_ = applied;
   books_ = books;
   holding_ = held != nullptr;
   if (held) q_hold_ = *held;

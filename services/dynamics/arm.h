@@ -47,7 +47,7 @@ class Arm {
 
   const State& state() const noexcept { return state_; }
   double t_s() const noexcept { return static_cast<double>(state_.step) * options_.dt_s; }
-  const Eigen::VectorXd& torque_applied() const noexcept { return integrator_.torque_applied(); }
+  const Eigen::VectorXd& torque_applied() const noexcept { return applied_; }
   bool torque_saturated() const noexcept { return report_.saturated > 0; }
   const StepReport& report() const noexcept { return report_; }
   const Books& books() const noexcept { return books_; }
@@ -73,7 +73,7 @@ class Arm {
   State state_;
   StepReport report_;
   Books books_;
-  Eigen::VectorXd tau_, tau_hold_, tau_gravity_, q_hold_, pull_;
+  Eigen::VectorXd tau_, applied_, tau_hold_, tau_gravity_, q_hold_, pull_;
   rbd::Workspace ws_;
   bool holding_ = false, gravity_works_ = false;
   double scale_J_ = 0, brake_per_s_ = 0;

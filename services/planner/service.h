@@ -30,6 +30,7 @@ class PlannerService final : public runtime::Service {
   /// Fails where the checkpoint cannot be opened.
   static Result<std::unique_ptr<PlannerService>, Problem> make(bus::Node& node, const scene::Scene& scene,
                                                                const ServiceConfig& config);
+  ~PlannerService() override { forget_escape(); }
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   bool finished() const override { return false; }
@@ -54,7 +55,9 @@ class PlannerService final : public runtime::Service {
   void fill_command();
   void publish_report(Time now, bool always);
   void report_silence(Time now);
+  void send_report(Time now);
   void publish_status(Time now, wire::ServiceState state);
+  std::optional<Problem> open_checkpoint();
   void save();
   bool load(std::span<const std::byte> bytes);
 

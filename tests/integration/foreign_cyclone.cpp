@@ -63,7 +63,7 @@ void golden(hamel_v1_PlannerReport& m) {
   m.arm = 1, m.epoch = 2, m.step = 3, m.t_s = 4.5;
   m.state = hamel_v1_PLANNER_STUCK, m.reason = hamel_v1_REASON_GOAL_BLOCKED;
   std::strcpy(m.detail, "a wall"), std::strcpy(m.method, "gyro");
-  m.goal_id = 5, m.target_error_m = 6.5, m.orientation_error_rad = 7.5, m.speed_mps = 8.5;
+  m.goal_id = 5, m.mode_id = 26, m.target_error_m = 6.5, m.orientation_error_rad = 7.5, m.speed_mps = 8.5;
   set(m.end_effector_m, {9.1, 9.2, 9.3});
   m.clearance_m = 10.5, m.clearance_min_m = 11.5, m.contacts = 12, m.path_length_m = 13.5,
   m.time_to_goal_s = 14.5;

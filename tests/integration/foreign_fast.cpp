@@ -60,7 +60,8 @@ void golden(ObstacleSet& m) {
 }
 void golden(PlannerReport& m) {
   m.arm(1), m.epoch(2), m.step(3), m.t_s(4.5), m.state(PLANNER_STUCK), m.reason(REASON_GOAL_BLOCKED);
-  m.detail("a wall"), m.method("gyro"), m.goal_id(5), m.target_error_m(6.5), m.orientation_error_rad(7.5);
+  m.detail("a wall"), m.method("gyro"), m.goal_id(5), m.mode_id(26), m.target_error_m(6.5),
+      m.orientation_error_rad(7.5);
   m.speed_mps(8.5), m.end_effector_m({9.1, 9.2, 9.3}), m.clearance_m(10.5), m.clearance_min_m(11.5),
       m.contacts(12);
   m.path_length_m(13.5), m.time_to_goal_s(14.5), m.gyroscopic_power_W(15.5), m.injected_power_W(16.5);

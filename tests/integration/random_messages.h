@@ -97,7 +97,7 @@ inline void randomise(Random& r, wire::ObstacleSet& m) {
 inline void randomise(Random& r, wire::PlannerReport& m) {
   m.arm = r.u32(), m.epoch = r.u64(), m.step = r.u64(), m.t_s = r.real();
   m.state = r.any(wire::PlannerState::fault), m.reason = r.any(wire::Reason::internal);
-  m.detail = r.text(256), m.method = r.text(256), m.goal_id = r.u64();
+  m.detail = r.text(256), m.method = r.text(256), m.goal_id = r.u64(), m.mode_id = r.u64();
   m.target_error_m = r.real(), m.orientation_error_rad = r.real(), m.speed_mps = r.real();
   r.fill(m.end_effector_m);
   m.clearance_m = r.real_or_inf(), m.clearance_min_m = r.real_or_inf(), m.contacts = r.u32();

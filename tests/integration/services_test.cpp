@@ -15,6 +15,7 @@
 
 using namespace hamel;
 using runtime::Clock;
+using test::made;
 using test::node;
 using namespace std::chrono_literals;
 
@@ -169,6 +170,40 @@ TEST(Restart, InLockstepContinuesBitForBit) {
   std::filesystem::remove_all(folder);
 }
 
+// Whoever listens must not see a restart in what is said: the torque that was applied least of all.
+TEST(Restart, AnArmThatComesBackSaysItsLastStateAgain) {
+  const std::string folder = testing::TempDir() + "/hamel-again-" + std::to_string(getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const auto n = node(13);
+  const scene::Scene s = test::shipped("four_link_avoid", {"duration_s=0.02"});
+  wire::Subscription<wire::ArmState> states(*n);
+  wire::ArmState said, again;
+  {
+    RelayedPlanner planner(*n, ~0ull);
+    auto arm = made(dynamics::DynamicsService::make(*n, s, {.state_dir = folder}));
+    const auto deadline = Clock::now() + 60s;
+    while (!arm->finished() && Clock::now() < deadline) {
+      arm->poll(Clock::now());
+      planner.poll();
+    }
+  }
+  while (states.take(said)) {
+  }
+  ASSERT_EQ(said.step, 20u);
+  EXPECT_NE(said.torque_applied[0], 0);
+  auto arm = made(dynamics::DynamicsService::make(*n, s, {.state_dir = folder}));
+  arm->poll(Clock::now());
+  ASSERT_TRUE(states.take(again));
+  EXPECT_EQ(again.step, said.step);
+  EXPECT_EQ(again.position, said.position);
+  EXPECT_EQ(again.momentum, said.momentum);
+  EXPECT_EQ(again.torque_applied, said.torque_applied);
+  EXPECT_EQ(again.energy_J, said.energy_J);
+  EXPECT_EQ(again.validity, said.validity);
+  std::filesystem::remove_all(folder);
+}
+
 /// A planner that answers states of a moving arm, with its checkpoint in `folder`; the last command it sends.
 wire::TorqueCommand answer(const std::string& folder, std::uint64_t first, std::uint64_t last,
                            std::uint32_t domain) {
@@ -252,6 +287,24 @@ TEST(Planner, PassesOverASampleThatNoJointCouldReach) {
   for (std::uint64_t k = 6; k <= 7; ++k) say(k, 0.001 * static_cast<double>(k));
   for (std::uint64_t k = 8; k <= 12; ++k) say(k, 0.3);
   EXPECT_EQ(answered, (std::vector<std::uint64_t>{1, 2, 3, 4, 6, 7, 11, 12}));
+}
+
+// A client that sent a mode may leave once the arm obeys and the planner has said the mode's id.
+TEST(Planner, SaysWhichModeItHasTaken) {
+  const auto n = node(14);
+  const scene::Scene s = test::shipped("panda_reach");
+  wire::Publisher<wire::ModeCommand> modes(*n);
+  wire::Subscription<wire::PlannerReport> reports(*n);
+  auto brain = made(planner::PlannerService::make(*n, s, {.pace = scene::Pace::realtime}));
+  wire::PlannerReport r;
+  auto now = Clock::now();
+  for (const auto& [id, mode] : {std::pair(7u, wire::Mode::hold), std::pair(9u, wire::Mode::resume)}) {
+    ASSERT_TRUE(modes.publish({.arm = s.arm, .id = id, .mode = mode}));
+    brain->poll(now += 200ms);
+    while (reports.take(r)) {
+    }
+    EXPECT_EQ(r.mode_id, id);
+  }
 }
 
 wire::ObstacleSet set(double t_s, double next_t_s, std::uint32_t source = 1, std::size_t n = 1) {
