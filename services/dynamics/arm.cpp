@@ -11,6 +11,8 @@ namespace {
 /// at most.
 double brake_rate(double dt_s) { return std::min(50.0, 0.5 / dt_s); }
 
+constexpr double kRest = 0.02;  // rad/s or m/s of every joint: at rest
+
 /// True when gravity does work on some joint: it asks for torque in one of a few configurations.
 bool gravity_works(Integrator& integrator, const Eigen::VectorXd& q0) {
   Eigen::VectorXd tau(q0.size());
@@ -42,9 +44,8 @@ Arm::Arm(const scene::Scene& scene)
 
 void Arm::drive_torque(const Drive& drive) noexcept {
   const bool hold = drive.kind == DriveKind::hold || (drive.kind == DriveKind::torque && drive.share < 1);
-  if (hold && !holding_) q_hold_ = state_.q;
-  holding_ = hold;
   if (hold) hold_torque();
+  holding_ &= hold;
   switch (drive.kind) {
     case DriveKind::free:
       tau_.setZero();
@@ -67,8 +68,14 @@ void Arm::drive_torque(const Drive& drive) noexcept {
   }
 }
 
-/// Critically damped about the place where holding began: M qdd = -(b/2)^2 M (q - q_hold) - b p.
+/// A brake until the arm has come to rest, then critically damped about that place, M qdd = -(b/2)^2 M (q -
+/// q_hold)
+/// - b p: about where holding began, it would swing back to what it came from.
 void Arm::hold_torque() noexcept {
+  if (!holding_) {
+    q_hold_ = state_.q;
+    holding_ = state_.qd.lpNorm<Eigen::Infinity>() < kRest;
+  }
   pull_ = (-0.25 * brake_per_s_ * brake_per_s_) * (state_.q - q_hold_);
   tau_gravity_.setZero();
   rbd::inverse_dynamics(integrator_.chain(), state_.q, tau_gravity_, pull_, ws_, tau_hold_);

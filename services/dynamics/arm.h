@@ -15,7 +15,7 @@ enum class DriveKind : std::uint8_t {
   free,    ///< no torque at all
   torque,  ///< the command's torque, gravity compensation added unless it includes it
   brake,   ///< come to rest where it is: gravity compensation and -b p
-  hold,    ///< come to rest and keep the place where holding began
+  hold,    ///< come to rest and keep the place
 };
 
 struct Drive {
@@ -56,7 +56,7 @@ class Arm {
   /// energy where gravity does nothing; 0 where nothing moved.
   double energy_drift_rel() const noexcept;
 
-  /// The place that is held; none while nothing is held.
+  /// The place that is held; none while nothing is held or the arm still comes to rest.
   const Eigen::VectorXd* held() const noexcept { return holding_ ? &q_hold_ : nullptr; }
   /// Continues from a saved state, its books, the torque that was applied and the place held (null: none);
   /// exact.

@@ -50,6 +50,11 @@ def strike(up, random_, service):
     return what, service
 
 
+def lengths(outages):
+    """The longest outage of each service [s]; one that lasts at the end of a run has no length yet."""
+    return {s: max((x["length_s"] or 0 for x in outages if x["service"] == s), default=0) for s in SERVICES}
+
+
 def jumps(states):
     """Where a command came in after a hold: the share that the ramp allows a step, and what the step took."""
     worst = 0.0
@@ -112,7 +117,7 @@ class Restart(unittest.TestCase):
             outages += o["outages"]
             runs += 1
             worst, clearance = max(worst, jump), min(clearance, o["min_clearance_m"])
-        longest = {s: max((x["length_s"] for x in outages if x["service"] == s), default=0) for s in SERVICES}
+        longest = lengths(outages)
         print(f"{name} seed {seed} {'vendors mixed' if extra else 'one vendor'}: {len(done)} blows "
               f"({sum(w == 'kill' for w, _ in done)} kills) over {runs} runs, all REACHED; contacts of the arm's making 0, others {self.others}; {len(outages)} outages told, "
               "longest " + ", ".join(f"{s} {v:.2f} s" for s, v in longest.items())
@@ -131,6 +136,31 @@ class Restart(unittest.TestCase):
     @unittest.skipUnless(SOAK, "only with HAMEL_SOAK=1")
     def test_panda_with_vendors_mixed(self):
         self.blows("panda_person", 4, 73, 50, pause_s=(0.1, 0.5), extra=MIXED)
+
+
+@unittest.skipUnless(SOAK, "only with HAMEL_SOAK=1")
+class Silence(unittest.TestCase):
+    """How long nothing comes after one blow that no other follows: from the last word before the kill to the first after it."""
+
+    def kills(self, domain, count, extra, pause_s=3.6):
+        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", 4 * count + 4,
+                "--domain", domain, *extra) as up:
+            up.child("dynamics")
+            time.sleep(2)
+            for i in range(count):
+                os.kill(up.child(SERVICES[i % 3]), signal.SIGKILL)
+                time.sleep(pause_s)
+            code, o, err = up.end(deadline_s=200)
+        self.assertEqual((code, o["outcome"], o["restarts"], o["contacts"]), (0, "REACHED", count, 0), err)
+        longest = lengths(o["outages"])
+        print(f"{' '.join(extra)}: {count} single kills, longest " + ", ".join(f"{s} {v:.2f} s" for s, v in longest.items()), flush=True)
+
+    def test_of_one_vendor(self):
+        self.kills(74, 15, ["--bus", "cyclonedds"])
+        self.kills(75, 15, ["--bus", "fastdds"])
+
+    def test_with_vendors_mixed(self):
+        self.kills(76, 15, MIXED)
 
 
 class Judge(unittest.TestCase):
