@@ -236,17 +236,21 @@ void PlannerService::plan(Time now) {
 /// Rollouts run beside the control thread; their answer enters at a step known beforehand, so that results do
 /// not depend on the thread's speed.
 void PlannerService::ask_escape(const Input& in) {
-  escape_asked_ = in.step;
-  escape_due_ = in.step + planner_.escape_steps(state_.dt_s);
-  forget_escape();
-  escape_stop_ = false;
-  escape_ = std::async(std::launch::async, [this, question = planner_.escape_question(in)] {
-    return find_escape(scene_.robot, scene_.planner, question, [this] { return escape_stop_.load(); });
-  });
+  question_ = planner_.escape_question(in);
+  start_escape();
   if (output_.report.state == State::stuck)
     spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
   else
     spdlog::info("t = {:.3f} s: little progress; looking for a quicker way", in.t_s);
+}
+
+void PlannerService::start_escape() {
+  forget_escape();
+  escape_due_ = question_.step + planner_.escape_steps(scene_.dynamics.dt_s);
+  escape_stop_ = false;
+  escape_ = std::async(std::launch::async, [this, question = question_] {
+    return find_escape(scene_.robot, scene_.planner, question, [this] { return escape_stop_.load(); });
+  });
 }
 
 /// Ends a question that nobody waits for any more, in the time of one rollout's cycle.
@@ -258,9 +262,8 @@ void PlannerService::forget_escape() {
 /// Lockstep waits for an answer that is due; real time takes it once it is there.
 void PlannerService::take_escape() {
   const Waypoint& w = planner_.memory().waypoint;
-  if (w.waiting != 0 && (!escape_.valid() || w.asked_step != escape_asked_)) {
-    planner_.take_escape({},
-                         state_.t_s);  // the question died with the planner before us: it will be asked again
+  if (w.waiting != 0 && (!escape_.valid() || w.asked_step != question_.step)) {
+    planner_.take_escape({}, state_.t_s);  // nobody thinks about it: it will be asked again
     return;
   }
   if (!escape_.valid() || state_.step < escape_due_) return;

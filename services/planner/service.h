@@ -51,6 +51,7 @@ class PlannerService final : public runtime::Service {
   bool answer(Time now);
   void plan(Time now);
   void ask_escape(const Input& in);
+  void start_escape();
   void take_escape();
   void fill_command();
   void publish_report(Time now, bool always);
@@ -98,9 +99,9 @@ class PlannerService final : public runtime::Service {
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
   std::atomic<bool> escape_stop_ = false;  ///< before escape_: outlives the question
-  std::future<Escape>
-      escape_;  ///< valid: a question is out, asked at escape_asked_, its answer due at escape_due_
-  std::uint64_t escape_asked_ = 0, escape_due_ = 0;
+  std::future<Escape> escape_;             ///< valid: question_ is out, its answer due at step escape_due_
+  EscapeQuestion question_;
+  std::uint64_t escape_due_ = 0;
   runtime::RateLimit refusals_;
   int leaps_in_a_row_ = 0;
   std::uint64_t states_discarded_ = 0;

@@ -5,12 +5,14 @@
 
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "common/files/scene_text.h"
 #include "services/dynamics/service.h"
 #include "services/perception/service.h"
 #include "services/planner/obstacle_view.h"
 #include "services/planner/service.h"
+#include "tests/support/planner_scene.h"
 #include "tests/support/services.h"
 
 using namespace hamel;
@@ -202,6 +204,54 @@ TEST(Restart, AnArmThatComesBackSaysItsLastStateAgain) {
   EXPECT_EQ(again.energy_J, said.energy_J);
   EXPECT_EQ(again.validity, said.validity);
   std::filesystem::remove_all(folder);
+}
+
+/// A run in lockstep in which the planner looks for ways out; with `killed` it ends and another takes its
+/// place as soon as it has asked for one.
+wire::RunSummary run_with_escapes(bool killed, std::uint32_t domain) {
+  const std::string folder = testing::TempDir() + "/hamel-asked-" + std::to_string(getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  const auto n = node(domain);
+  scene::Scene s =
+      test::shipped("four_link_avoid", {"dynamics.dt_s=0.002", "duration_s=12", "planner.method=gyro",
+                                        "planner.kobs=0", "planner.kc=0", "planner.vmax_mps=1"});
+  s.robot = test::planar_arm(4, 1.0, 0.0);
+  wire::Subscription<wire::RunSummary> summaries(*n);
+  wire::Subscription<wire::PlannerReport> reports(*n);
+  auto arm = made(dynamics::DynamicsService::make(*n, s, {}));
+  auto eyes = perception::PerceptionService::make(*n, s);
+  auto brain = made(planner::PlannerService::make(*n, s, {.state_dir = folder}));
+  wire::PlannerReport r;
+  std::uint32_t asked = 0;
+  const auto deadline = Clock::now() + 60s;
+  while (!arm->finished() && Clock::now() < deadline) {
+    bool any = arm->poll(Clock::now());
+    any |= eyes.value()->poll(Clock::now());
+    any |= brain->poll(Clock::now());
+    bool more = false;
+    while (reports.take(r)) more |= std::exchange(asked, r.escapes) < r.escapes;
+    if (more && killed) {
+      brain.reset();
+      brain = made(planner::PlannerService::make(*n, s, {.state_dir = folder}));
+    }
+    if (!any) n->wait(arm->due());
+  }
+  EXPECT_GE(asked, 1u);
+  arm->close();
+  wire::RunSummary last;
+  while (summaries.take(last)) {
+  }
+  std::filesystem::remove_all(folder);
+  return last;
+}
+
+// A planner that dies with a question out leaves it in its checkpoint: the next one gets the same answer at
+// the same step.
+TEST(Restart, AQuestionOutlivesThePlannerThatAskedIt) {
+  const auto whole = run_with_escapes(false, 15), killed = run_with_escapes(true, 16);
+  EXPECT_EQ(whole.steps, 6000u);
+  EXPECT_EQ(killed.trajectory_hash, whole.trajectory_hash);
 }
 
 /// A planner that answers states of a moving arm, with its checkpoint in `folder`; the last command it sends.

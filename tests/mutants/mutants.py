@@ -1,4 +1,4 @@
-"""The laws of the dynamics, and for each a wrong sign that its test must see.
+"""The laws of the dynamics and of the planner, and for each a wrong sign that its test must see.
 
 file, old, new: one place of the source; test, filter: who must fail.
 """
@@ -17,6 +17,7 @@ class Mutant(NamedTuple):
 
 
 CORE = "services/dynamics/core/"
+PLAN = "services/planner/core/"
 MUTANTS = [
     Mutant("dexp_turns_back", "dexp is the slope of exp", "common/lie/so3.h", "Identity() + cosc(x) * W + sinc3(x)",
            "Identity() - cosc(x) * W + sinc3(x)", "lie_accuracy_test", "*Rotations*"),
@@ -66,4 +67,23 @@ MUTANTS = [
            "integrator_robustness_test", "Stops*"),
     Mutant("potential_upside_down", "work is the change of energy", CORE + "node.cpp", "chain.potential_offset - dot(", "chain.potential_offset + dot(",
            "variational_test", "*WorkIs*"),
+    Mutant("gyro_that_works", "the mapping is powerless", PLAN + "mapping.cpp", "G(j, i) -= g;", "G(j, i) += g;",
+           "planner_force_law_test", "Mapping.*"),
+    Mutant("mapping_without_trace", "symmetric is the skew part of the paper's", PLAN + "mapping.cpp", "0.5 * (Lam.trace() * w - Lam * w)",
+           "0.5 * (Lam.trace() * w + Lam * w)", "planner_force_law_test", "*SkewPart*"),
+    Mutant("gate_of_who_leaves", "only who closes is turned", PLAN + "force_law.cpp", "closing <= 0", "closing >= 0",
+           "planner_force_law_test", "*"),
+    Mutant("gain_without_speed", "stops at the closed form", PLAN + "force_law.cpp", "o.kobs * n.dot(v) / near * open", "o.kobs / near * open",
+           "planner_force_law_test", "FreeParticle.*"),
+    Mutant("flat_distance", "second derivative of the distance", PLAN + "barrier.cpp", "(w.squaredNorm() - along * along) / D",
+           "(w.squaredNorm() + along * along) / D", "planner_barrier_test", "*SecondDerivative*"),
+    Mutant("torque_without_gravity", "limits hold for the sum with gravity", PLAN + "barrier.cpp", "arm.coriolis[j] + arm.gravity[j]",
+           "arm.coriolis[j] - arm.gravity[j]", "planner_obstacles_test", "TorqueLimits.*"),
+    Mutant("no_ramp", "a ramp begins with a hold", PLAN + "steering.cpp", "tau_att *= ramped;", "", "planner_states_test", "*Ramp*"),
+    Mutant("tank_that_fills_itself", "circulation is paid for", PLAN + "steering.cpp", "memory.tank_J -= std::max(", "memory.tank_J += std::max(",
+           "planner_example_5_2_test", "*"),
+    Mutant("goal_in_a_wall", "a goal inside what stands is refused at once", PLAN + "pursuit.cpp",
+           "item.inflation_m + dmin - slack", "item.inflation_m + dmin + slack + 1", "planner_states_test", "*"),
+    Mutant("target_behind", "a moving target is followed", PLAN + "attraction.cpp", "goal.X_WG.p + age_s *", "goal.X_WG.p - age_s *",
+           "planner_goals_test", "*Followed*"),
 ]
