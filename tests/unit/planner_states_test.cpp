@@ -205,6 +205,12 @@ TEST(States, AGoalInsideWhatStandsIsSaidAtOnceAndNotTriedUntilThatIsGone) {
   EXPECT_EQ(b.go(30).last.state, State::reached);
 }
 
+TEST(States, AGoalThatHasRoomBesideWhatStandsIsTried) {
+  Bench b;
+  b.obstacles = {sphere(1, b.goal.X_WG.p + Eigen::Vector3d(0, 0.35, 0), 0.2)};
+  expect(b.plan(), State::moving, Reason::none);
+}
+
 // A base that reaches farther than the arm does.
 TEST(States, WhatRunsIntoTheBaseIsToldWhereverItIs) {
   Bench b;
