@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -187,8 +188,8 @@ class Network(unittest.TestCase):
             _, there, err = hamel("up", *up, "--json")
             self.assertEqual(json.loads(there)["trajectory_hash"], json.loads(here)["trajectory_hash"], err)
         finally:
-            server.kill()
-            server.wait()
+            server.send_signal(signal.SIGINT)  # killed, it would leave its shared memory behind
+            server.wait(20)
         code, _, err = hamel("status", "--bus", "cyclonedds", "--discovery-server", "127.0.0.1:11877", "--domain", 97)
         self.assertEqual(code, 2)
         self.assertIn("Fast DDS", err)
