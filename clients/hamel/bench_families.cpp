@@ -8,6 +8,7 @@
 
 #include "clients/hamel/judge.h"
 #include "clients/hamel/robots.h"
+#include "common/base/random.h"
 #include "common/files/urdf.h"
 #include "common/rbd/rbd.h"
 #include "common/scene/self_links.h"
@@ -24,28 +25,15 @@ constexpr double kStep_s = 2e-3;
 constexpr double kPlanarRadius_m = 0.05;  // of a link
 constexpr double kStops_Nm = 500;         // hard stops at joint limits, for methods that know none
 
-/// Random numbers that are the same everywhere: splitmix64.
-class Dice {
+class Dice : public SplitMix64 {
  public:
-  explicit Dice(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return z ^ (z >> 31);
-  }
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-  }
+  using SplitMix64::SplitMix64;
   Vector3d direction() {
     for (;;) {
       const Vector3d v(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
       if (v.norm() > 0.1 && v.norm() <= 1) return v.normalized();
     }
   }
-
- private:
-  std::uint64_t state_;
 };
 
 std::uint64_t hash(const std::string& text, std::uint64_t h) {
@@ -308,7 +296,7 @@ Checked<BenchRobots> bench_robots(ArmModel model) {
 }
 
 scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, std::uint64_t seed, std::size_t index) {
-  std::uint64_t h = hash(cell.family, 1469598103934665603ull ^ (seed * 0x9e3779b97f4a7c15ull));
+  std::uint64_t h = hash(cell.family, 1469598103934665603ull ^ (seed * SplitMix64::kStep));
   h = hash(std::to_string(cell.spheres) + "/" + std::to_string(index), h);  // variants share their scenes
   scene::Scene s =
       cell.family == "example_5_2" ? draw_example_5_2(robots.planar, h) : Drawing(cell, robots, h).draw();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "clients/hamel/ticks.h"
+#include "common/base/random.h"
 #include "common/base/text.h"
 #include "common/files/scene_text.h"
 #include "services/dynamics/trajectory_hash.h"
@@ -16,18 +17,10 @@ namespace hamel::client {
 
 namespace {
 
-/// SplitMix64: one number of the stream `seed`, whatever was drawn before.
-std::uint64_t mixed(std::uint64_t seed) {
-  std::uint64_t z = seed + 0x9e3779b97f4a7c15ull;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-  return z ^ (z >> 31);
-}
-
-/// In [0, 1).
+/// In [0, 1): one number for each field of a variation, whatever was drawn before.
 double uniform(std::uint64_t seed, std::size_t variation, std::size_t field) {
-  const std::uint64_t drawn = mixed(mixed(mixed(seed) ^ variation) ^ (field << 32));
-  return static_cast<double>(drawn >> 11) * 0x1p-53;
+  const std::uint64_t of_variation = SplitMix64(SplitMix64(seed).next() ^ variation).next();
+  return SplitMix64(of_variation ^ (field << 32)).unit();
 }
 
 /// What is wrong with the names of the fields that vary, or nothing.

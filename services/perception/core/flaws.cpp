@@ -3,29 +3,27 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/random.h"
+
 namespace hamel::perception {
 namespace {
 
-/// A uniform number in (0, 1) for each count, by splitmix64 [Steele 2014].
+/// A stream of random numbers for each seed, set and obstacle.
 class Dice {
  public:
-  Dice(std::uint64_t seed, std::uint64_t set, std::uint64_t id) : state_(seed) {
-    for (const std::uint64_t word : {set, id}) state_ = mixed() ^ (word * 0x9e3779b97f4a7c15ull);
+  Dice(std::uint64_t seed, std::uint64_t set, std::uint64_t id) : random_(seed) {
+    for (const std::uint64_t word : {set, id})
+      random_ = SplitMix64(random_.next() ^ (word * SplitMix64::kStep));
   }
-  double uniform() { return (static_cast<double>(mixed() >> 11) + 0.5) * 0x1p-53; }
+  /// In (0, 1).
+  double uniform() { return random_.unit() + 0x1p-54; }
   double normal() {
     const double radius = std::sqrt(-2 * std::log(uniform()));
     return radius * std::cos(2 * std::numbers::pi * uniform());
   }
 
  private:
-  std::uint64_t mixed() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return z ^ (z >> 31);
-  }
-  std::uint64_t state_;
+  SplitMix64 random_;
 };
 
 bool is_seen(const scene::Flaws& f, const Eigen::Vector3d& p_W) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/random.h"
 #include "common/rbd/rbd.h"
 
 namespace hamel::planner {
@@ -14,23 +15,8 @@ using Eigen::VectorXd;
 
 constexpr double kStep_s = 0.01;
 
-/// splitmix64: the same numbers everywhere.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : state_(seed) {}
-  double uniform(double low, double high) {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return low + (high - low) * static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-  }
-
- private:
-  std::uint64_t state_;
-};
-
 // Near waypoints first, then anywhere: a small detour is the likelier one to be free, and the shorter.
-VectorXd draw_waypoint(const model::Chain& chain, const VectorXd& q, double spread, Dice& dice) {
+VectorXd draw_waypoint(const model::Chain& chain, const VectorXd& q, double spread, SplitMix64& dice) {
   VectorXd w(chain.n());
   for (int j = 0; j < chain.n(); ++j) {
     const model::JointLimits& limits = chain.joint(j).limits;
@@ -133,7 +119,7 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
   from.goal.X_WG.R =
       Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()).toRotationMatrix() * from.goal.X_WG.R;
   Rollout rollout(robot, options, stop);
-  Dice dice(question.step * 0x2545f4914f6cdd1dull + question.tries);
+  SplitMix64 dice(question.step * 0x2545f4914f6cdd1dull + question.tries);
   double most_s = options.escape_horizon_s;
   if (!question.stuck && rollout.run(from, {}, most_s).reached) return escape;
   for (int k = 0; k < options.escape_rollouts; ++k) {
