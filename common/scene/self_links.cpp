@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/even.h"
 #include "common/geometry/solid.h"
 #include "common/rbd/rbd.h"
 
@@ -17,19 +18,15 @@ struct LinkPair {
   int a = 0, b = 0, touched = 0;
 };
 
-// The k-th of a sequence that fills a box evenly. [Roberts 2018]
+// The k-th of configurations that fill the limits evenly.
 Eigen::VectorXd sample(const model::Chain& chain, int k) {
   Eigen::VectorXd q(chain.n());
-  double phi = 2;
-  for (int it = 0; it < 30; ++it) phi = std::pow(1 + phi, 1.0 / (chain.n() + 1));
-  double step = 1;
+  const std::vector<double> u = even_point(chain.n(), k + 1);
   for (int i = 0; i < chain.n(); ++i) {
-    step /= phi;
-    const double u = 0.5 + step * (k + 1);
     const model::JointLimits& limits = chain.joint(i).limits;
     const double low = std::max(limits.lower, -std::numbers::pi),
                  high = std::min(limits.upper, std::numbers::pi);
-    q[i] = low + (u - std::floor(u)) * (high - low);
+    q[i] = low + u[static_cast<std::size_t>(i)] * (high - low);
   }
   return q;
 }

@@ -9,7 +9,7 @@ namespace hamel {
 namespace {
 
 TEST(SplitMix64, DrawsThePublishedNumbers) {
-  // Of seed 0: java.util.SplittableRandom's mix; of 1234567: rosettacode.org/wiki/Pseudo-random_numbers.
+  // Of seed 0: Vigna's splitmix64.c; of 1234567: Rosetta Code, "Pseudo-random numbers/Splitmix64".
   SplitMix64 zero(0);
   for (const std::uint64_t x : {0xe220a8397b1dcdafull, 0x6e789e6aa1b965f4ull, 0x06c45d188009454full,
                                 0xf88bb8a8724c81ecull, 0x1b39896a51a8749bull})

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
+
+#include "common/base/even.h"
 
 namespace hamel::planner {
 namespace {
@@ -34,17 +37,10 @@ class Search {
     }
   }
 
-  // The k-th of a sequence that fills the limits evenly. [Roberts 2018]
+  // The k-th of configurations that fill the limits evenly.
   VectorXd start(int k) const {
-    VectorXd q(chain_.n());
-    double phi = 2, step = 1;
-    for (int it = 0; it < 30; ++it) phi = std::pow(1 + phi, 1.0 / (chain_.n() + 1));
-    for (int i = 0; i < chain_.n(); ++i) {
-      step /= phi;
-      const double u = 0.5 + step * k;
-      q[i] = low_[i] + (u - std::floor(u)) * (high_[i] - low_[i]);
-    }
-    return q;
+    const std::vector<double> u = even_point(chain_.n(), k);
+    return low_ + Eigen::Map<const VectorXd>(u.data(), chain_.n()).cwiseProduct(high_ - low_);
   }
 
   // What is left of the way at q: turned, moved; sets J_.
