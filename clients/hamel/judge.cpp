@@ -126,8 +126,7 @@ struct Judge::Impl {
         const model::Joint& joint = chain.joint(j);
         const bool slides = joint.kind == model::JointKind::prismatic;
         levers(i, j) = slides ? 1 : reach;
-        const double longest =
-            slides ? std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper)) : 0;
+        const double longest = travel_m(joint);
         reach += joint.X_PJ.p.norm() + (std::isfinite(longest) ? longest : 0);
       }
     }

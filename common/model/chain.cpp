@@ -1,6 +1,7 @@
 #include "common/model/chain.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -134,6 +135,25 @@ Checked<Chain> build(ChainSpec spec) {
   Problems found = problems(spec);
   if (!found.empty()) return found;
   return Chain(std::move(spec));
+}
+
+Chain weightless(const Chain& chain) {
+  ChainSpec spec = chain.spec();
+  spec.gravity_W_mps2.setZero();
+  return build(std::move(spec)).value();  // a checked chain stays valid without gravity
+}
+
+double travel_m(const Joint& joint) noexcept {
+  if (joint.kind != JointKind::prismatic) return 0;
+  return std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
+}
+
+bool slides_hold(const Chain& chain, const Eigen::VectorXd& q) noexcept {
+  for (int i = 0; i < chain.n(); ++i) {
+    const Joint& joint = chain.joint(i);
+    if (joint.kind == JointKind::prismatic && !(std::abs(q[i]) <= travel_m(joint))) return false;
+  }
+  return true;
 }
 
 }  // namespace hamel::model

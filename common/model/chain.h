@@ -86,4 +86,11 @@ class Chain {
 /// < 0.
 Checked<Chain> build(ChainSpec spec);
 
+/// The chain without gravity.
+Chain weightless(const Chain& chain);
+/// How far a joint slides from q = 0, at most: max(|lower|, |upper|), +inf without limits.  0 where it turns.
+double travel_m(const Joint& joint) noexcept;
+/// True while every slide of the chain keeps to its travel.
+bool slides_hold(const Chain& chain, const Eigen::VectorXd& q) noexcept;
+
 }  // namespace hamel::model

@@ -12,12 +12,6 @@ using Eigen::Vector3d;
 constexpr double kSlack_m = 1e-8;  // rounding of distances
 constexpr double kNear_m = 0.1;    // what sift_near() found is good for so far a way of each link
 
-/// How far joint i may slide.
-double travel_m(const model::Joint& joint) {
-  if (joint.kind != model::JointKind::prismatic) return 0;
-  return std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
-}
-
 /// The point of joint 0's axis next to p (both in link 0's frame), which does not move; for a slide the
 /// origin.
 Vector3d pivot(const model::Joint& first, const Vector3d& p) {
@@ -133,14 +127,6 @@ void Reach::add_ball(const ReachBall& ball) {
   centres_[k].out_m = std::max(centres_[k].out_m, ball.axis_m + ball.radius_m);
   centre_of_.push_back(k);
   balls_.push_back(ball);
-}
-
-bool Reach::holds(const Eigen::VectorXd& q) const noexcept {
-  for (int i = 0; i < chain_.n(); ++i) {
-    const model::Joint& joint = chain_.joint(i);
-    if (joint.kind == model::JointKind::prismatic && !(std::abs(q[i]) <= travel_m(joint))) return false;
-  }
-  return true;
 }
 
 /// How much nearer an obstacle may be than where it was stamped: its way in the horizon.

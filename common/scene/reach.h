@@ -35,7 +35,7 @@ class Reach {
   Reach(const Robot& robot, const PlannerOptions& options);
 
   /// True while q keeps to what the balls stand on: slides within their limits.
-  bool holds(const Eigen::VectorXd& q) const noexcept;
+  bool holds(const Eigen::VectorXd& q) const noexcept { return model::slides_hold(chain_, q); }
 
   /// Puts those of `set` that may matter within `horizon_s` into `kept`, in their order, and into `floor_m`
   /// (size n) for each link a distance (less what the planner inflates obstacles by) that none comes under in

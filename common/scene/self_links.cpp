@@ -1,7 +1,6 @@
 #include "common/scene/self_links.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "common/base/even.h"

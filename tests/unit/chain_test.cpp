@@ -68,6 +68,21 @@ INSTANTIATE_TEST_SUITE_P(
         Spoiled{"armature", [](ChainSpec& s) { s.joints[0].armature = kNaN; }, "armature: = nan"}),
     [](const auto& row) { return row.param.name; });
 
+TEST(Chain, SlidesKeepToTheFartherOfTheirLimits) {
+  ChainSpec spec = test::planar(3, 1, 1, 0.1);
+  spec.joints[0].limits = {-1, 2};
+  spec.joints[1].kind = spec.joints[2].kind = JointKind::prismatic;
+  spec.joints[1].limits = {-0.5, 0.25};
+  const Chain chain = test::checked(spec);
+  EXPECT_EQ(travel_m(chain.joint(0)), 0) << "it turns";
+  EXPECT_EQ(travel_m(chain.joint(1)), 0.5);
+  EXPECT_EQ(travel_m(chain.joint(2)), INFINITY);
+  EXPECT_TRUE(slides_hold(chain, Eigen::Vector3d(9, -0.5, 9)));
+  EXPECT_TRUE(slides_hold(chain, Eigen::Vector3d(9, 0.5, 9)));
+  EXPECT_FALSE(slides_hold(chain, Eigen::Vector3d(0, -0.51, 0)));
+  EXPECT_FALSE(slides_hold(chain, Eigen::Vector3d(0, kNaN, 0)));
+}
+
 TEST(Chain, ListsEveryProblemAtOnce) {
   ChainSpec spec = test::planar(3, 1, 1, 0.1);
   spec.joints[0].damping = -1;

@@ -1,18 +1,7 @@
 #include "services/planner/core/arm.h"
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
 namespace hamel::planner {
 namespace {
-
-model::Chain weightless(const model::Chain& chain) {
-  model::ChainSpec spec = chain.spec();
-  spec.gravity_W_mps2.setZero();
-  auto built = model::build(std::move(spec));
-  return std::move(built).value();  // a checked chain stays valid without gravity
-}
 
 // Largest distance between first joint and end effector: all offsets stretched out, prismatic joints at full
 // length.
@@ -20,9 +9,7 @@ double reach(const model::Chain& chain) {
   double sum = chain.X_NE().p.norm();
   for (int i = 0; i < chain.n(); ++i) {
     if (i > 0) sum += chain.joint(i).X_PJ.p.norm();
-    const auto& limits = chain.joint(i).limits;
-    if (chain.joint(i).kind == model::JointKind::prismatic)
-      sum += std::max(std::abs(limits.lower), std::abs(limits.upper));
+    sum += travel_m(chain.joint(i));
   }
   return sum;
 }

@@ -82,11 +82,6 @@ class Rollout {
     return o;
   }
   bool stopped() const noexcept { return stop_ && stop_(); }
-  static model::Chain weightless(const model::Chain& chain) {
-    model::ChainSpec spec = chain.spec();
-    spec.gravity_W_mps2.setZero();
-    return std::move(model::build(std::move(spec))).value();
-  }
   void advance() {
     rbd::forward_dynamics(chain_, q_, qd_, out_.torque_Nm, ws_, qdd_);
     qd_ += kStep_s * qdd_;

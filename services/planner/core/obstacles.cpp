@@ -76,8 +76,7 @@ Workspace workspace(const scene::Robot& robot) {
   for (int i = 0; i < chain.n(); ++i) {
     const model::Joint& joint = chain.joint(i);
     if (i > 0) reach += joint.X_PJ.p.norm();
-    if (joint.kind == model::JointKind::prismatic)
-      reach += std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
+    reach += travel_m(joint);
     out.radius_m = std::max(out.radius_m, reach);
     for (const scene::LinkShape& s : robot.shapes)
       if (s.link == i)

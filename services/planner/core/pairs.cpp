@@ -22,7 +22,6 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options, co
     : options_(options),
       savings_(savings),
       levers_m_(scene::levers(robot)),
-      slide_m_(Eigen::VectorXd::Constant(robot.chain.n(), scene::kInf)),
       asked_(static_cast<std::size_t>(robot.chain.n())),
       rests_(asked_.size(), false),
       pairs_(kMost),
@@ -53,11 +52,6 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options, co
   lever_m_ = levers_m_.rowwise().maxCoeff();
   q_own_ = Eigen::VectorXd::Constant(n_, std::numeric_limits<double>::quiet_NaN());  // near nothing
   for (Asked& a : asked_) a.q = q_own_;
-  for (int j = 0; j < robot.chain.n(); ++j) {
-    const model::Joint& joint = robot.chain.joint(j);
-    if (joint.kind == model::JointKind::prismatic)
-      slide_m_[j] = std::max(std::abs(joint.limits.lower), std::abs(joint.limits.upper));
-  }
   links_.resize(bodies_.size());
   for (std::size_t k = 0; k < bodies_.size(); ++k) {
     links_[k].now.shape = bodies_[k].solid_B.shape;
@@ -82,11 +76,6 @@ const geometry::Solid& Pairs::place(const Arm& arm, Body& b) noexcept {
   return b.solid_W;
 }
 
-// The levers hold for slides within their limits.
-bool Pairs::slides_hold(const Eigen::VectorXd& q) const noexcept {
-  return (q.array().abs() <= slide_m_.array()).all();
-}
-
 // True while the link, and what moves, cannot have gone farther than its distances may be off, nor into
 // range.
 bool Pairs::rests(const Arm& arm, const Obstacles& obstacles, std::size_t link) const noexcept {
@@ -100,7 +89,7 @@ bool Pairs::rests(const Arm& arm, const Obstacles& obstacles, std::size_t link) 
 
 void Pairs::find(const Arm& arm, const Obstacles& obstacles, std::span<const double> link_floor_m) noexcept {
   const bool same_set = obstacles.set() != 0 && obstacles.set() == asked_set_;
-  const bool may_rest = savings_.requery_m > 0 && same_set && slides_hold(arm.q);
+  const bool may_rest = savings_.requery_m > 0 && same_set && slides_hold(arm.chain, arm.q);
   asked_set_ = obstacles.set();
   for (std::size_t link = 0; link < rests_.size(); ++link) {
     rests_[link] = may_rest && rests(arm, obstacles, link);
@@ -172,7 +161,7 @@ void Pairs::find_self(const Arm& arm) noexcept {
   const double range = std::min(options_.rho0_m, kSelfRange_m);
   if (savings_.far_links) {
     const double way = lever_m_.dot((arm.q - q_own_).cwiseAbs());
-    if (!(way < kOwnWay_m) || !slides_hold(arm.q)) list_near_links(arm);
+    if (!(way < kOwnWay_m) || !slides_hold(arm.chain, arm.q)) list_near_links(arm);
   }
   for (const Own& own : savings_.far_links ? near_own_ : own_) {
     Body &a = bodies_[own.a], &b = bodies_[own.b];

@@ -109,7 +109,6 @@ class Pairs {
   void list_near_links(const Arm& arm) noexcept;
   void measure(const Arm& arm, Body& body, const Obstacles& obstacles) noexcept;
   bool rests(const Arm& arm, const Obstacles& obstacles, std::size_t link) const noexcept;
-  bool slides_hold(const Eigen::VectorXd& q) const noexcept;
   void offer(const Pair& pair) noexcept;
   void complete_self(const Arm& arm, std::size_t k) noexcept;
   void keep_nearest_of_each_link() noexcept;
@@ -121,7 +120,6 @@ class Pairs {
       near_own_;  ///< near_own_: those that may come into range while the arm is near q_own_
   Eigen::VectorXd q_own_, lever_m_;  ///< lever_m_: the largest of each joint's levers
   Eigen::MatrixXd levers_m_;         ///< (joint, link)
-  Eigen::VectorXd slide_m_;          ///< how far each slide goes, +inf for joints that turn
   std::vector<Asked> asked_;         ///< each link
   std::vector<bool> rests_;
   std::uint64_t placing_ = 0, asked_set_ = 0;
