@@ -26,6 +26,15 @@ inline Eigen::Vector3d operator*(const Pose& X_AB, const Eigen::Vector3d& p_B) {
 }
 inline Pose inverse(const Pose& X_AB) { return {X_AB.R.transpose(), -(X_AB.R.transpose() * X_AB.p)}; }
 
+/// Where X_WB is after t_s of constant velocity: V_WB = (omega, velocity of B's origin) in world axes.
+inline Pose moved(const Pose& X_WB, const Twist& V_WB, double t_s) {
+  const Eigen::Vector3d turn = t_s * V_WB.head<3>();
+  Pose X = X_WB;
+  if (!turn.isZero(0)) X.R = exp_so3(turn) * X_WB.R;
+  X.p += t_s * V_WB.tail<3>();
+  return X;
+}
+
 /// The same twist in the other frame: V_A = Ad(X_AB) V_B.
 inline Twist Ad(const Pose& X_AB, const Twist& V_B) {
   Twist V_A;

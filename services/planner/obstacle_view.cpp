@@ -15,8 +15,6 @@ constexpr std::size_t kMaxSources = 16;
 constexpr std::size_t kWorthwhile = 16;  ///< fewer are measured sooner than sifted again and again
 constexpr double kHorizon_s = 5;         ///< a moving obstacle is culled when it is out of reach for so long
 
-constexpr std::size_t kMost = 4096;  ///< more are a fault of whoever sends them, and the planner says so
-
 }  // namespace
 
 Savings savings(const scene::Scene& scene) {
@@ -86,7 +84,7 @@ double ObstacleView::at(double t_s, const Eigen::VectorXd& q, wire::Causes& caus
     if (std::isfinite(s.next_t_s)) oldest = std::max(oldest, t_s - s.t_s);
   }
   if (changed_) put_together();
-  const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q) && all_.size() <= kMost;
+  const bool sound = reach_ && oldest <= kHorizon_s && reach_->holds(q) && all_.size() <= Obstacles::kMost;
   std::uint64_t which = 1;  // of the three vectors is shown
   shown_ = all_;
   if (sound && (merge_ || cull_) && (!cull_ || kept_.size() < kWorthwhile)) {

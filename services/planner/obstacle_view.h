@@ -13,7 +13,8 @@
 #include "common/scene/outward.h"
 #include "common/scene/reach.h"
 #include "common/wire/messages.h"
-#include "services/planner/core/pairs.h"
+#include "services/planner/core/obstacles.h"
+#include "services/planner/core/savings.h"
 
 namespace hamel::planner {
 

@@ -105,6 +105,20 @@ TEST_P(Lie, RigidDexpIsTheSlopeOfExp) {
   EXPECT_LT((slope - dexp_se3(x) * rate).norm(), 1e-8);
 }
 
+TEST_P(Lie, WhatMovesGoesOnWithItsTwist) {
+  at_all_angles([&](const Vector3d& turn_per_s) {
+    const Pose X_WB = rng.pose(1);
+    Twist V_WB;
+    V_WB << turn_per_s, rng.vec3(2);
+    const Pose X = moved(X_WB, V_WB, 1), halves = moved(moved(X_WB, V_WB, 0.25), V_WB, 0.75);
+    EXPECT_LT((X.R - halves.R).cwiseAbs().maxCoeff() + (X.p - halves.p).norm(), 4e-15);
+    EXPECT_LT((X.R - exp_so3(turn_per_s) * X_WB.R).cwiseAbs().maxCoeff(), 1e-15) << "about world axes";
+    EXPECT_LT((X.p - X_WB.p - V_WB.tail<3>()).norm(), 1e-15) << "its origin goes straight";
+    V_WB.head<3>().setZero();
+    EXPECT_EQ(moved(X_WB, V_WB, 1e9).R, X_WB.R) << "bit for bit";
+  });
+}
+
 TEST_P(Lie, AdjointsFollowTheGroup) {
   const Pose X = rng.pose(2), Y = rng.pose(2);
   Twist V, W;

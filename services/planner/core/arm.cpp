@@ -25,6 +25,7 @@ Arm::Arm(const model::Chain& as_given)
       M(Eigen::MatrixXd::Identity(n(), n())),
       M_inverse(M),
       M_llt(M),
+      momentum(q),
       coriolis(q),
       gravity(q),
       J_E(Eigen::MatrixXd::Zero(6, n())),
@@ -46,6 +47,7 @@ void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) no
   look(q_now, qd_now);
   rbd::gravity_torque(with_gravity, ws, gravity);
   rbd::mass_matrix(chain, ws, M);
+  momentum.noalias() = M * qd;
   M_llt.compute(M);
   M_inverse.setIdentity();
   M_llt.solveInPlace(M_inverse);

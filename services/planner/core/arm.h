@@ -27,6 +27,7 @@ struct Arm {
   Eigen::VectorXd q, qd;
   Eigen::MatrixXd M, M_inverse;
   Eigen::LLT<Eigen::MatrixXd> M_llt;
+  Eigen::VectorXd momentum;  ///< M qd
   Eigen::VectorXd coriolis;  ///< c(q, qd)
   Eigen::VectorXd gravity;   ///< torque that holds the arm, which another adds to ours
   lie::Pose X_WE;

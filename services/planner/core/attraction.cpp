@@ -34,7 +34,6 @@ Attraction::Attraction(const Arm& arm, const scene::PlannerOptions& options)
     : options_(options),
       torque_(Eigen::VectorXd::Zero(arm.n())),
       qdd_(torque_),
-      momentum_(torque_),
       WJ_(Eigen::MatrixXd::Zero(arm.n(), 6)),
       W_(Eigen::MatrixXd::Identity(arm.n(), arm.n())),
       W_llt_(W_) {}
@@ -49,14 +48,12 @@ void Attraction::update(const Arm& arm, const scene::Goal& goal, double age_s, d
 void Attraction::toward_pose(const Arm& arm, const scene::Goal& goal, double age_s, double slow) noexcept {
   const bool pose = goal.kind == scene::GoalKind::pose;
   const double rate = options_.kp / options_.kv;
-  X_WT_.p = goal.X_WG.p + age_s * goal.V_WG.tail<3>();
+  X_WT_ = lie::moved(goal.X_WG, goal.V_WG, age_s);
   const Vector3d e = X_WT_.p - arm.X_WE.p;
   const Vector3d v_d = slow * saturated(rate * e, options_.vmax_mps);
   a_.tail<3>() = -options_.kv * (arm.V_WE.tail<3>() - goal.V_WG.tail<3>() - v_d);
   error_ = {e.norm(), 0, e.norm() / options_.goal_tolerance_m};
   if (pose) {
-    const Vector3d turned = age_s * goal.V_WG.head<3>();
-    X_WT_.R = Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()).toRotationMatrix() * goal.X_WG.R;
     const Vector3d r = rotation_error(X_WT_.R, arm.X_WE.R);
     const Vector3d w_d = slow * saturated(rate * r, options_.angular_vmax_radps);
     a_.head<3>() = -options_.kv * (arm.V_WE.head<3>() - goal.V_WG.head<3>() - w_d);
@@ -75,8 +72,7 @@ void Attraction::toward_joints(const Arm& arm, const scene::Goal& goal, double s
   qdd_ *= tip_speed > options_.vmax_mps ? slow * options_.vmax_mps / tip_speed : slow;
   qdd_ = -options_.kv * (arm.qd - qdd_);
   torque_.noalias() = arm.M * qdd_;
-  momentum_.noalias() = arm.M * arm.qd;
-  braking_ = options_.kv * arm.qd.dot(momentum_);
+  braking_ = options_.kv * arm.qd.dot(arm.momentum);
   potential_ = 0;
   for (int j = 0; j < arm.n(); ++j) {
     const double e_j = goal.joints[j] - arm.q[j];
@@ -121,8 +117,7 @@ void Attraction::brake(const Arm& arm, Eigen::Index rows) noexcept {
   Eigen::Matrix<double, 6, 1> v = Eigen::Matrix<double, 6, 1>::Zero();
   v.tail(rows) = arm.V_WE.tail(rows);
   const Eigen::Matrix<double, 6, 1> f = Lam_.solve(v);
-  momentum_.noalias() = arm.M * arm.qd;
-  braking_ = options_.kv * momentum_.dot(WJ_.rightCols(rows).lazyProduct(f.tail(rows)));
+  braking_ = options_.kv * arm.momentum.dot(WJ_.rightCols(rows).lazyProduct(f.tail(rows)));
 }
 
 // qdd = W^-1 J^T (J W^-1 J^T + lam2/10)^-1 a, tau = M qdd, where W weighs down a joint near a limit it is

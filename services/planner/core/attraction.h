@@ -60,7 +60,7 @@ class Attraction {
       Eigen::Matrix<double, 6, 1>::Zero();  ///< angular part unused for positions
   Eigen::Matrix<double, 6, 6> Lam_inverse_ = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::LLT<Eigen::Matrix<double, 6, 6>> Lam_;
-  Eigen::VectorXd torque_, qdd_, momentum_;
+  Eigen::VectorXd torque_, qdd_;
   Eigen::MatrixXd WJ_;  ///< n x 6: W^-1 J^T
   Eigen::MatrixXd W_;
   Eigen::LLT<Eigen::MatrixXd> W_llt_;

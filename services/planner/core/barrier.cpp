@@ -180,7 +180,6 @@ Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, Vecto
   const VectorXd& u = least_norm_.multipliers();
   Outcome outcome;
   outcome.rows = static_cast<int>(rows_);
-  outcome.steps = least_norm_.steps();
   outcome.active = least_norm_.steps() > 0;
   // A miss m for ever costs m/g^2 of distance.
   const double g = gain_, afford = 0.5 * g * g * std::max(options_.dmin_m, 1e-3);

@@ -24,7 +24,7 @@ class Barrier {
   Barrier(const Arm& arm, const scene::PlannerOptions& options);
 
   struct Outcome {
-    int rows = 0, steps = 0;
+    int rows = 0;
     bool active = false;        ///< some row pushed
     bool infeasible = false;    ///< a pair or a joint limit is missed by more than it can afford
     bool torque_bound = false;  ///< a torque limit pushed

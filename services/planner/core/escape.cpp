@@ -1,6 +1,5 @@
 #include "services/planner/core/escape.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -45,7 +44,7 @@ class Rollout {
 
   struct Ending {
     bool reached = false;
-    double t_s = 0, error_m = 0;
+    double t_s = 0;
   };
 
   /// @param waypoint  none: empty
@@ -68,11 +67,11 @@ class Rollout {
                     out_);
       if (k == 0) planner_.take_escape(waypoint, t_s);  // the first cycle has begun the goal
       const Report& r = out_.report;
-      if (r.state == State::reached) return {true, t_s, r.target_error_m};
+      if (r.state == State::reached) return {true, t_s};
       if (r.state == State::stuck || r.state == State::fault || r.reason == Reason::contact) break;
       advance();
     }
-    return {false, most_s, out_.report.target_error_m};
+    return {false, most_s};
   }
 
  private:
@@ -87,7 +86,7 @@ class Rollout {
     qd_ += kStep_s * qdd_;
     q_ += kStep_s * qd_;
     for (geometry::Obstacle& o : obstacles_)
-      if (o.velocity_known) o.X_WO.p += kStep_s * o.V_WO.tail<3>();
+      if (o.velocity_known) o.X_WO = lie::moved(o.X_WO, o.V_WO, kStep_s);
   }
 
   Options options_;
@@ -109,10 +108,7 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
   if (question.q.size() != robot.chain.n() || question.q.size() > static_cast<Eigen::Index>(kMaxWaypoint))
     return escape;
   EscapeQuestion from = question;
-  from.goal.X_WG.p += from.goal_age_s * from.goal.V_WG.tail<3>();
-  const Eigen::Vector3d turned = from.goal_age_s * from.goal.V_WG.head<3>();
-  from.goal.X_WG.R =
-      Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()).toRotationMatrix() * from.goal.X_WG.R;
+  from.goal.X_WG = lie::moved(from.goal.X_WG, from.goal.V_WG, from.goal_age_s);
   Rollout rollout(robot, options, stop);
   SplitMix64 dice(question.step * 0x2545f4914f6cdd1dull + question.tries);
   double most_s = options.escape_horizon_s;
@@ -127,7 +123,6 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
     escape.found = true;
     escape.waypoint = waypoint;
     escape.reached_after_s = most_s = ending.t_s;
-    escape.error_m = ending.error_m;
   }
   return escape;
 }

@@ -29,9 +29,9 @@ struct EscapeQuestion {
 /// By way of a configuration, or not at all.
 struct Escape {
   bool found = false;
-  Eigen::VectorXd waypoint;                 ///< n
-  int rollouts = 0;                         ///< runs it took
-  double reached_after_s = 0, error_m = 0;  ///< of the run chosen
+  Eigen::VectorXd waypoint;    ///< n
+  int rollouts = 0;            ///< runs it took
+  double reached_after_s = 0;  ///< of the run chosen
 };
 
 /// Rolls out `options.escape_rollouts` random waypoints, `escape_horizon_s` each, at 10 ms a cycle; of the

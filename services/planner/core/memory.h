@@ -32,12 +32,15 @@ struct HeldTurn {
   Triple axis{};
 };
 
+/// What the sightings of an obstacle told: its place, from the second one on its velocity too.
+enum class Known : std::uint64_t { place, velocity, nothing };
+
 /// Where an obstacle of unknown velocity was last seen, and how fast it seems to move.
 struct Sighting {
   std::uint64_t obstacle = 0;  ///< the key
   double stamp_s = 0;
   Triple at{}, velocity{};
-  std::uint64_t known = 0;  ///< 1: seen twice, `velocity` is an estimate
+  Known known = Known::place;
 };
 
 /// A configuration to pass on the way to the goal.

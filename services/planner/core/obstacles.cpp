@@ -18,13 +18,6 @@ bool usable(const geometry::Obstacle& o) {
   return finite && (o.shape.dims_m.array() >= 0).all();
 }
 
-void move(geometry::Obstacle& o, double age_s) {
-  o.X_WO.p += age_s * o.V_WO.tail<3>();
-  const Vector3d turn = age_s * o.V_WO.head<3>();
-  const double angle = turn.norm();
-  if (angle > 1e-12) o.X_WO.R = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * o.X_WO.R;
-}
-
 constexpr double kForget_s = 1;  // a gap after which an obstacle counts as new
 
 // The table's entry of an obstacle, a new one, or null where the table is full of fresher ones.
@@ -38,7 +31,7 @@ Sighting* sighting(Memory& m, std::uint32_t id, double stamp_s) {
   else
     for (Sighting& s : m.sightings)
       if (std::abs(stamp_s - s.stamp_s) > kForget_s) free = &s;
-  if (free) *free = Sighting{id, stamp_s, {}, {}, 2};  // 2: seen by nobody yet
+  if (free) *free = Sighting{id, stamp_s, {}, {}, Known::nothing};
   return free;
 }
 
@@ -48,18 +41,19 @@ bool estimate(Memory& m, const geometry::Obstacle& o, double stamp_s, Vector3d& 
   if (!s) return false;
   const double passed_s = stamp_s - s->stamp_s;
   const Vector3d at(s->at[0], s->at[1], s->at[2]), before(s->velocity[0], s->velocity[1], s->velocity[2]);
-  if (s->known != 2 && std::abs(passed_s) < 1e-9) {
+  const bool seen = s->known != Known::nothing, had_velocity = s->known == Known::velocity;
+  if (seen && std::abs(passed_s) < 1e-9) {
     velocity = before;
-    return s->known == 1;
+    return had_velocity;
   }
   const Vector3d now = (o.X_WO.p - at) / passed_s;
-  const bool trusted = s->known != 2 && passed_s > 0 && passed_s < kForget_s && now.norm() < kFastest_mps;
-  velocity = trusted ? s->known == 1 ? Vector3d(0.5 * (before + now)) : now : Vector3d::Zero();
+  const bool trusted = seen && passed_s > 0 && passed_s < kForget_s && now.norm() < kFastest_mps;
+  velocity = trusted ? had_velocity ? Vector3d(0.5 * (before + now)) : now : Vector3d::Zero();
   *s = Sighting{o.id,
                 stamp_s,
                 {o.X_WO.p[0], o.X_WO.p[1], o.X_WO.p[2]},
                 {velocity[0], velocity[1], velocity[2]},
-                trusted ? 1u : 0u};
+                trusted ? Known::velocity : Known::place};
   return trusted;
 }
 
@@ -147,7 +141,7 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
     const double grows = s.velocity_known ? 0 : o.assumed_speed_mps;
     const double speed = item.now.V_WO.tail<3>().norm() + grows;
     fastest_mps_ = item.now.V_WO.head<3>().isZero(0) ? std::max(fastest_mps_, speed) : scene::kInf;
-    move(item.now, age);
+    item.now.X_WO = lie::moved(item.now.X_WO, item.now.V_WO, age);
     item.solid = geometry::solid(item.now.shape, item.now.X_WO);
     items_.push_back(item);
   }

@@ -31,7 +31,7 @@ bool in_reach(const Workspace& workspace, const geometry::Obstacle& o,
 /// ones, and only those that come within kSeen_m (or rho0) of the workspace while their set holds.
 class Obstacles {
  public:
-  static constexpr std::size_t kMost = 4096;
+  static constexpr std::size_t kMost = 4096;  ///< more are a fault of whoever sends them: too_many()
   explicit Obstacles(const Workspace& workspace = {{}, scene::kInf});
   /// Takes a set `age_s` old at time t_s.  A moving obstacle goes on with its twist.  One of unknown velocity
   /// is watched: from its second set on it goes on with the velocity between the last two (the mean of that

@@ -265,9 +265,9 @@ void Pairs::advance(const Arm& arm, double ahead_s) noexcept {
     return bodies_[bodies_.size() - static_cast<std::size_t>(shapes_ - shape)];
   };
   for (Pair& pair : items()) {
-    lie::Pose X_WO = pair.item->now.X_WO;
-    X_WO.p += ahead_s * pair.item->now.V_WO.tail<3>();
-    pair.at = geometry::closest(place(arm, body(pair.shape)), geometry::solid(pair.item->now.shape, X_WO));
+    const geometry::Obstacle& o = pair.item->now;
+    const geometry::Solid there = geometry::solid(o.shape, lie::moved(o.X_WO, o.V_WO, ahead_s));
+    pair.at = geometry::closest(place(arm, body(pair.shape)), there);
     pair.d = pair.at.distance_m - pair.item->inflation_m;
     pair.n = pair.at.normal;
   }

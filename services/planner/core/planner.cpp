@@ -175,7 +175,7 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.time_to_goal_s = memory.time_to_goal_s;
   out.gyroscopic_power_W = gyro.gyroscopic_power_W();
   out.injected_power_W = gyro.injected_power_W();
-  out.kinetic_J = arm.q.allFinite() ? 0.5 * arm.qd.dot(arm.M.lazyProduct(arm.qd)) : 0;
+  out.kinetic_J = arm.q.allFinite() ? 0.5 * arm.qd.dot(arm.momentum) : 0;
   out.attraction_J = has_goal ? attraction.potential_J() : 0;
   out.tank_J = memory.tank_J;
   out.pairs_in_range = static_cast<int>(pairs.items().size());
@@ -186,7 +186,6 @@ void Planner::Impl::report(const Verdict& verdict, Report& out) noexcept {
   out.escape_waiting = memory.waypoint.waiting != 0;
   out.escapes = memory.waypoint.asked;
   out.barrier_rows = outcome.rows;
-  out.barrier_steps = outcome.steps;
   report_links(pairs, options, out);
 }
 

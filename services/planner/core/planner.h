@@ -96,13 +96,13 @@ struct Report {
   std::uint64_t contacts = 0;                                         ///< cycles with clearance < 0 so far
   double path_length_m = 0;                                           ///< of the end effector so far
   double time_to_goal_s = -1;                                         ///< < 0: not reached yet
-  double gyroscopic_power_W = 0;            ///< 0 but for rounding where the mapping is powerless
-  double injected_power_W = 0;              ///< by moving obstacles and circulation
-  double kinetic_J = 0, attraction_J = 0;   ///< of the arm; of the pull, kp/2 e^T Lam e
-  double tank_J = 0;                        ///< what circulation may still spend
-  int pairs_in_range = 0;                   ///< (link shape, obstacle) pairs acted on
-  int pairs_dropped = 0;                    ///< in range but beyond kMaxPairs: the farthest ones
-  int barrier_rows = 0, barrier_steps = 0;  ///< rows seen, steps of its active set
+  double gyroscopic_power_W = 0;           ///< 0 but for rounding where the mapping is powerless
+  double injected_power_W = 0;             ///< by moving obstacles and circulation
+  double kinetic_J = 0, attraction_J = 0;  ///< of the arm; of the pull, kp/2 e^T Lam e
+  double tank_J = 0;                       ///< what circulation may still spend
+  int pairs_in_range = 0;                  ///< (link shape, obstacle) pairs acted on
+  int pairs_dropped = 0;                   ///< in range but beyond kMaxPairs: the farthest ones
+  int barrier_rows = 0;                    ///< distances and limits it looked at
   int velocities_estimated = 0, velocities_unknown = 0;  ///< obstacles that do not tell theirs
   /// Stuck, or lagging, and a way out may be found: ask find_escape() about this cycle's input with this many
   /// tries and tell take_escape() what it says.  Asked once; then `escape_waiting` until it is told.

@@ -49,8 +49,7 @@ void Planner::Impl::steer(const Input& in, bool refused, VectorXd& tau) noexcept
     tau_att *= options.amax / most;
     qdd_att *= options.amax / most;
   }
-  tau.noalias() = -options.damping * (arm.M * arm.qd);
-  tau += tau_att;
+  tau = tau_att - options.damping * arm.momentum;
   if (options.method == Method::khatib) {
     for (std::size_t k = 0; k < pairs.items().size(); ++k) {
       Pair& pair = pairs.items()[k];
@@ -71,9 +70,8 @@ void Planner::Impl::steer(const Input& in, bool refused, VectorXd& tau) noexcept
 // by what damping and the pull's own braking take out.  1: open; it closes smoothly over the last tenth.
 double Planner::Impl::open_tank(double dt_s) noexcept {
   if (memory.tank_full_J < 0) memory.tank_J = memory.tank_full_J = attraction.potential_J();
-  qdd.noalias() = arm.M * arm.qd;
   const double taken_W =
-      options.damping * arm.qd.dot(qdd) + pull_share * std::max(attraction.braking_W(), 0.0);
+      options.damping * arm.qd.dot(arm.momentum) + pull_share * std::max(attraction.braking_W(), 0.0);
   memory.tank_J = std::clamp(memory.tank_J + dt_s * taken_W, 0.0, memory.tank_full_J);
   return memory.tank_full_J > 0 ? smooth_step(10 * memory.tank_J / memory.tank_full_J) : 0;
 }
