@@ -1,6 +1,5 @@
 #include "clients/hamel/judge.h"
 
-#include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/distance.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <deque>
 #include <utility>
 
+#include "clients/hamel/fcl_shapes.h"
 #include "common/rbd/rbd.h"
 
 namespace hamel::client {
@@ -18,30 +18,12 @@ using Eigen::Isometry3d;
 using Eigen::Vector3d;
 using geometry::Obstacle;
 using geometry::ShapeKind;
-using Solid = std::shared_ptr<fcl::CollisionGeometryd>;
+using Solid = FclSolid;
 
 constexpr double kFinest_m = 1e-3;        // travel between two samples, at most
-constexpr double kHalfSpace_m = 100;      // edge of the box that stands for a half-space
 constexpr double kCausing_mps = 0.02;     // of the arm's point toward what it touches
 constexpr double kCausingWithin_s = 0.1;  // before the touch
 constexpr double kInf = std::numeric_limits<double>::infinity();
-
-Solid solid(const geometry::Shape& s) {
-  const Vector3d& d = s.dims_m;
-  switch (s.kind) {
-    case ShapeKind::sphere:
-      return std::make_shared<fcl::Sphered>(d[0]);
-    case ShapeKind::capsule:
-      return std::make_shared<fcl::Capsuled>(d[0], d[1]);
-    case ShapeKind::cylinder:
-      return std::make_shared<fcl::Cylinderd>(d[0], d[1]);
-    case ShapeKind::box:
-      return std::make_shared<fcl::Boxd>(d[0], d[1], d[2]);
-    case ShapeKind::half_space:
-      break;
-  }
-  return std::make_shared<fcl::Boxd>(kHalfSpace_m, kHalfSpace_m, kHalfSpace_m);
-}
 
 /// Farthest point of a shape from its origin.
 double extent(const geometry::Shape& s) {
@@ -59,18 +41,6 @@ double extent(const geometry::Shape& s) {
       break;
   }
   return kHalfSpace_m;
-}
-
-Isometry3d transform(const lie::Pose& X) {
-  Isometry3d T = Isometry3d::Identity();
-  T.linear() = X.R;
-  T.translation() = X.p;
-  return T;
-}
-
-Isometry3d transform(const geometry::Shape& s, lie::Pose X) {
-  if (s.kind == ShapeKind::half_space) X.p -= 0.5 * kHalfSpace_m * X.R.col(2);
-  return transform(X);
 }
 
 double distance(const Solid& a, const Isometry3d& X_a, const Solid& b, const Isometry3d& X_b) {
@@ -106,7 +76,7 @@ struct Judge::Impl {
   explicit Impl(const scene::Robot& r)
       : chain(r.chain), ws(chain), travel_m(static_cast<std::size_t>(chain.n()), 0.0) {
     for (const scene::LinkShape& s : r.shapes) {
-      bodies.push_back({s.link, solid(s.shape), transform(s.shape, s.X_LS)});
+      bodies.push_back({s.link, fcl_solid(s.shape), fcl_transform(s.shape, s.X_LS)});
       size_m.push_back(s.X_LS.p.norm() + extent(s.shape));
     }
     for (const auto& [a, b] : r.self_pairs)
@@ -126,7 +96,7 @@ struct Judge::Impl {
         const model::Joint& joint = chain.joint(j);
         const bool slides = joint.kind == model::JointKind::prismatic;
         levers(i, j) = slides ? 1 : reach;
-        const double longest = travel_m(joint);
+        const double longest = model::travel_m(joint);
         reach += joint.X_PJ.p.norm() + (std::isfinite(longest) ? longest : 0);
       }
     }
@@ -138,7 +108,7 @@ struct Judge::Impl {
     rbd::positions(chain, q, ws);
     for (Body& b : bodies) {
       const lie::Pose& X_WL = b.link < 0 ? chain.X_WB0() : ws.X_WB[static_cast<std::size_t>(b.link)];
-      b.X_WS = transform(X_WL) * b.X_LS;
+      b.X_WS = fcl_transform(X_WL) * b.X_LS;
     }
   }
 
@@ -194,7 +164,7 @@ void Judge::Impl::follow(std::span<const Obstacle> obstacles) {
     x.then = x.fresh ? obstacles[k] : x.now;
     x.now = obstacles[k];
     if (!reshaped) continue;
-    x.solid = solid(x.now.shape);
+    x.solid = fcl_solid(x.now.shape);
     x.size_m = extent(x.now.shape);
     x.due_m.assign(bodies.size(), -kInf);
   }
@@ -247,7 +217,7 @@ bool Judge::Impl::look(double t_s, double share, const Eigen::VectorXd& q) {
     const double there = o.travel_m + share * step_of(o.then, o.now, o.size_m);
     Obstacle at = o.now;
     at.X_WO.p = o.then.X_WO.p + share * (o.now.X_WO.p - o.then.X_WO.p);
-    const Isometry3d X_WO = transform(at.shape, at.X_WO);
+    const Isometry3d X_WO = fcl_transform(at.shape, at.X_WO);
     for (std::size_t k = 0; k < bodies.size(); ++k) {
       const Body& b = bodies[k];
       if (gone(b) + there < o.due_m[k] || (b.link < 0 && there == 0)) continue;
@@ -352,8 +322,8 @@ double Judge::clearance_of_link(int link, const Eigen::VectorXd& q, std::span<co
   impl_->place(q);
   double d = kInf;
   for (const Obstacle& o : obstacles) {
-    const Solid other = solid(o.shape);
-    const Isometry3d X_WO = transform(o.shape, o.X_WO);
+    const Solid other = fcl_solid(o.shape);
+    const Isometry3d X_WO = fcl_transform(o.shape, o.X_WO);
     for (const Impl::Body& b : impl_->bodies)
       if (b.link == link) d = std::min(d, distance(b.solid, b.X_WS, other, X_WO));
   }

@@ -1,7 +1,3 @@
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -12,6 +8,7 @@
 #include "hamel_v1PubSubTypes.h"
 #include "idl/topics.h"
 #include "tests/bench/bare.h"
+#include "tests/support/loopback_fast.h"
 
 namespace hamel::bench {
 namespace {
@@ -20,18 +17,6 @@ using namespace hamel::v1;
 namespace dds = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::types::ReturnCode_t;
-
-dds::DomainParticipant* participant(std::uint32_t domain) {
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList = {"127.0.0.1"};
-  dds::DomainParticipantQos qos;
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  rtps::Locator_t here;
-  rtps::IPLocator::setIPv4(here, "127.0.0.1");
-  qos.wire_protocol().builtin.initialPeersList.push_back(here);
-  return dds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
-}
 
 template <class Qos>
 Qos common_qos() {
@@ -60,7 +45,8 @@ void fill(TorqueCommand& m) {
 template <class Out, class OutType, class In, class InType>
 class FastEnd final : public BareEnd, dds::DataReaderListener {
  public:
-  FastEnd(const Topic& to, const Topic& from, std::uint32_t domain) : participant_(participant(domain)) {
+  FastEnd(const Topic& to, const Topic& from, std::uint32_t domain)
+      : participant_(test::loopback_participant(domain)) {
     fill(out_);
     auto wqos = common_qos<dds::DataWriterQos>();
     wqos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;

@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/support/folder.h"
+
 using hamel::runtime::Checkpoint;
 
 namespace {
@@ -22,19 +24,14 @@ std::vector<std::byte> payload(unsigned char fill, std::size_t size) {
 
 class CheckpointTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = testing::TempDir() + "/hamel-checkpoint-XXXXXX";
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder = pattern;
-    path = folder + "/slot";
-  }
-  void TearDown() override { std::filesystem::remove_all(folder); }
   std::unique_ptr<Checkpoint> open(std::uint32_t kind = kKind) {
     auto c = Checkpoint::open(path, kind, kCapacity);
     EXPECT_TRUE(c) << (c ? "" : to_string(c.error()));
     return c ? std::move(c).value() : nullptr;
   }
-  std::string folder, path, note;
+  const hamel::test::Folder folder;
+  const std::string path = folder.path() + "/slot";
+  std::string note;
 };
 
 TEST_F(CheckpointTest, IsEmptyAtFirst) {
@@ -100,7 +97,7 @@ TEST_F(CheckpointTest, HasOneWriter) {
 }
 
 TEST_F(CheckpointTest, NamesAFolderThatIsNotThere) {
-  const auto c = Checkpoint::open(folder + "/none/slot", kKind, kCapacity);
+  const auto c = Checkpoint::open(folder.path() + "/none/slot", kKind, kCapacity);
   ASSERT_FALSE(c);
   EXPECT_NE(c.error().where.find("none"), std::string::npos);
 }

@@ -1,7 +1,3 @@
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -12,6 +8,7 @@
 
 #include "hamel_v1PubSubTypes.h"
 #include "tests/integration/foreign.h"
+#include "tests/support/loopback_fast.h"
 
 namespace hamel::test {
 namespace {
@@ -104,18 +101,6 @@ std::vector<std::byte> serialised(T& m, dds::TopicDataType& type) {
   if (!type.serialize(&m, &payload)) return {};
   const auto* bytes = reinterpret_cast<const std::byte*>(payload.data);
   return {bytes, bytes + payload.length};
-}
-
-dds::DomainParticipant* loopback_participant(unsigned domain) {
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList = {"127.0.0.1"};
-  dds::DomainParticipantQos qos;
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  rtps::Locator_t here;
-  rtps::IPLocator::setIPv4(here, "127.0.0.1");
-  qos.wire_protocol().builtin.initialPeersList.push_back(here);
-  return dds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
 }
 
 template <class T, class PubSubType>

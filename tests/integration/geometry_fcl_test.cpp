@@ -1,5 +1,4 @@
 // Distances of every pair of shapes against FCL, skipping none.
-#include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/distance.h>
 #include <gtest/gtest.h>
 
@@ -8,11 +7,14 @@
 #include <cmath>
 #include <random>
 
+#include "clients/hamel/fcl_shapes.h"
 #include "common/geometry/solid.h"
 
 namespace hamel::geometry {
 namespace {
 
+using client::fcl_solid;
+using client::fcl_transform;
 using Eigen::Vector3d;
 
 constexpr std::array kKinds{ShapeKind::sphere, ShapeKind::capsule, ShapeKind::cylinder, ShapeKind::box,
@@ -38,32 +40,6 @@ struct Random {
   }
 };
 
-// A half-space is a box of 100 m whose upper face it is.
-std::shared_ptr<fcl::CollisionGeometryd> of(const Shape& s) {
-  const Vector3d& m = s.dims_m;
-  switch (s.kind) {
-    case ShapeKind::sphere:
-      return std::make_shared<fcl::Sphered>(m[0]);
-    case ShapeKind::capsule:
-      return std::make_shared<fcl::Capsuled>(m[0], m[1]);
-    case ShapeKind::cylinder:
-      return std::make_shared<fcl::Cylinderd>(m[0], m[1]);
-    case ShapeKind::box:
-      return std::make_shared<fcl::Boxd>(m[0], m[1], m[2]);
-    case ShapeKind::half_space:
-      break;
-  }
-  return std::make_shared<fcl::Boxd>(100, 100, 100);
-}
-
-Eigen::Isometry3d at(const Shape& s, const lie::Pose& X, const Vector3d& shift = Vector3d::Zero()) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = X.R;
-  T.translation() = X.p + shift;
-  if (s.kind == ShapeKind::half_space) T.translation() -= 50 * X.R.col(2);
-  return T;
-}
-
 /// A pair of shapes as FCL sees it, the second one moved by a shift.
 struct Oracle {
   Shape a, b;
@@ -72,12 +48,14 @@ struct Oracle {
     fcl::DistanceRequestd request;
     request.distance_tolerance = 1e-9;
     fcl::DistanceResultd result;
-    return fcl::distance(of(a).get(), at(a, X_a), of(b).get(), at(b, X_b), request, result);
+    return fcl::distance(fcl_solid(a).get(), fcl_transform(a, X_a), fcl_solid(b).get(), fcl_transform(b, X_b),
+                         request, result);
   }
   bool together(const Vector3d& shift) const {
     fcl::CollisionRequestd request;
     fcl::CollisionResultd result;
-    return fcl::collide(of(a).get(), at(a, X_a), of(b).get(), at(b, X_b, shift), request, result) > 0;
+    return fcl::collide(fcl_solid(a).get(), fcl_transform(a, X_a), fcl_solid(b).get(),
+                        fcl_transform(b, {X_b.R, X_b.p + shift}), request, result) > 0;
   }
 };
 

@@ -1,18 +1,12 @@
 /// The services over the in-process bus, with a planner of the test's own.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstring>
-#include <filesystem>
-#include <utility>
 
-#include "common/files/scene_text.h"
 #include "services/dynamics/service.h"
-#include "services/perception/service.h"
 #include "services/planner/obstacle_view.h"
 #include "services/planner/service.h"
-#include "tests/support/planner_scene.h"
 #include "tests/support/services.h"
 
 using namespace hamel;
@@ -31,14 +25,7 @@ class RelayedPlanner {
     wire::ArmState s;
     bool any = false;
     while (states_.take(s)) {
-      wire::TorqueCommand c;
-      c.arm = s.arm;
-      c.epoch = 1;
-      c.state_incarnation = s.incarnation;
-      c.step = s.step;
-      c.t_s = s.t_s;
-      c.torque = wire::JointVector::Zero(s.position.size());
-      c.torque[0] = 0.25;
+      wire::TorqueCommand c = test::answer_to(s, 0.25);
       if (s.step == flip_at_) {
         std::uint64_t bits;
         std::memcpy(&bits, c.torque.data(), sizeof bits);
@@ -134,180 +121,6 @@ TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
   EXPECT_EQ(steps_after([](auto& c) { c.epoch = 6; }), 1u) << "a planner that takes over";
 }
 
-/// Runs a scene in lockstep to `until`, all services new, with checkpoints in `folder`.
-wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain) {
-  const auto n = node(domain);
-  scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
-  s.duration_s = until_s;
-  wire::Subscription<wire::RunSummary> summaries(*n);
-  auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder});
-  auto eyes = perception::PerceptionService::make(*n, s);
-  auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder});
-  EXPECT_TRUE(arm && eyes && brain);
-  const auto deadline = Clock::now() + 60s;
-  while (!arm.value()->finished() && Clock::now() < deadline) {
-    bool any = arm.value()->poll(Clock::now());
-    any |= eyes.value()->poll(Clock::now());
-    any |= brain.value()->poll(Clock::now());
-    if (!any) n->wait(arm.value()->due());
-  }
-  EXPECT_EQ(arm.value()->outcome(), dynamics::Outcome::done);
-  arm.value()->close();
-  wire::RunSummary last;
-  while (summaries.take(last)) {
-  }
-  return last;
-}
-
-TEST(Restart, InLockstepContinuesBitForBit) {
-  const std::string folder = testing::TempDir() + "/hamel-restart-" + std::to_string(getpid());
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
-  const auto whole = run_to(1.0, "", 4);
-  (void)run_to(0.4, folder, 5);
-  const auto resumed = run_to(1.0, folder, 6);
-  EXPECT_EQ(resumed.steps, 1000u);
-  EXPECT_EQ(resumed.trajectory_hash, whole.trajectory_hash);
-  EXPECT_EQ(resumed.energy_drift_rel, whole.energy_drift_rel);
-  std::filesystem::remove_all(folder);
-}
-
-// Whoever listens must not see a restart in what is said: the torque that was applied least of all.
-TEST(Restart, AnArmThatComesBackSaysItsLastStateAgain) {
-  const std::string folder = testing::TempDir() + "/hamel-again-" + std::to_string(getpid());
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
-  const auto n = node(13);
-  const scene::Scene s = test::shipped("four_link_avoid", {"duration_s=0.02"});
-  wire::Subscription<wire::ArmState> states(*n);
-  wire::ArmState said, again;
-  {
-    RelayedPlanner planner(*n, ~0ull);
-    auto arm = made(dynamics::DynamicsService::make(*n, s, {.state_dir = folder}));
-    const auto deadline = Clock::now() + 60s;
-    while (!arm->finished() && Clock::now() < deadline) {
-      arm->poll(Clock::now());
-      planner.poll();
-    }
-  }
-  while (states.take(said)) {
-  }
-  ASSERT_EQ(said.step, 20u);
-  EXPECT_NE(said.torque_applied[0], 0);
-  auto arm = made(dynamics::DynamicsService::make(*n, s, {.state_dir = folder}));
-  arm->poll(Clock::now());
-  ASSERT_TRUE(states.take(again));
-  EXPECT_EQ(again.step, said.step);
-  EXPECT_EQ(again.position, said.position);
-  EXPECT_EQ(again.momentum, said.momentum);
-  EXPECT_EQ(again.torque_applied, said.torque_applied);
-  EXPECT_EQ(again.energy_J, said.energy_J);
-  EXPECT_EQ(again.validity, said.validity);
-  std::filesystem::remove_all(folder);
-}
-
-/// A run in lockstep in which the planner looks for ways out; with `killed` it ends and another takes its
-/// place as soon as it has asked for one.
-wire::RunSummary run_with_escapes(bool killed, std::uint32_t domain) {
-  const std::string folder = testing::TempDir() + "/hamel-asked-" + std::to_string(getpid());
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
-  const auto n = node(domain);
-  scene::Scene s =
-      test::shipped("four_link_avoid", {"dynamics.dt_s=0.002", "duration_s=12", "planner.method=gyro",
-                                        "planner.kobs=0", "planner.kc=0", "planner.vmax_mps=1"});
-  s.robot = test::planar_arm(4, 1.0, 0.0);
-  wire::Subscription<wire::RunSummary> summaries(*n);
-  wire::Subscription<wire::PlannerReport> reports(*n);
-  auto arm = made(dynamics::DynamicsService::make(*n, s, {}));
-  auto eyes = perception::PerceptionService::make(*n, s);
-  auto brain = made(planner::PlannerService::make(*n, s, {.state_dir = folder}));
-  wire::PlannerReport r;
-  std::uint32_t asked = 0;
-  const auto deadline = Clock::now() + 60s;
-  while (!arm->finished() && Clock::now() < deadline) {
-    bool any = arm->poll(Clock::now());
-    any |= eyes.value()->poll(Clock::now());
-    any |= brain->poll(Clock::now());
-    bool more = false;
-    while (reports.take(r)) more |= std::exchange(asked, r.escapes) < r.escapes;
-    if (more && killed) {
-      brain.reset();
-      brain = made(planner::PlannerService::make(*n, s, {.state_dir = folder}));
-    }
-    if (!any) n->wait(arm->due());
-  }
-  EXPECT_GE(asked, 1u);
-  arm->close();
-  wire::RunSummary last;
-  while (summaries.take(last)) {
-  }
-  std::filesystem::remove_all(folder);
-  return last;
-}
-
-// A planner that dies with a question out leaves it in its checkpoint: the next one gets the same answer at
-// the same step.
-TEST(Restart, AQuestionOutlivesThePlannerThatAskedIt) {
-  const auto whole = run_with_escapes(false, 15), killed = run_with_escapes(true, 16);
-  EXPECT_EQ(whole.steps, 6000u);
-  EXPECT_EQ(killed.trajectory_hash, whole.trajectory_hash);
-}
-
-/// A planner that answers states of a moving arm, with its checkpoint in `folder`; the last command it sends.
-wire::TorqueCommand answer(const std::string& folder, std::uint64_t first, std::uint64_t last,
-                           std::uint32_t domain) {
-  const auto n = node(domain);
-  const scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
-  wire::Publisher<wire::ArmState> states(*n);
-  wire::Publisher<wire::ObstacleSet> sets(*n);
-  wire::Subscription<wire::TorqueCommand> commands(*n);
-  auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder});
-  EXPECT_TRUE(brain);
-  wire::ObstacleSet set;
-  set.source = s.arm;
-  set.incarnation = 1;
-  set.obstacles.push_back(s.perception.obstacles[0].at_start);
-  EXPECT_TRUE(sets.publish(set));
-  wire::TorqueCommand newest;
-  for (std::uint64_t k = first; k <= last; ++k) {
-    wire::ArmState state;
-    state.arm = s.arm;
-    state.incarnation = 1;
-    state.step = k;
-    state.dt_s = 1e-3;
-    state.t_s = 1e-3 * static_cast<double>(k);
-    state.position = wire::JointVector::Constant(4, 0.3 + 0.05 * static_cast<double>(k));
-    state.velocity = wire::JointVector::Constant(4, 0.5);
-    state.momentum = state.torque_applied = wire::JointVector::Zero(4);
-    EXPECT_TRUE(states.publish(state));
-    brain.value()->poll(Clock::now());
-    while (commands.take(newest)) {
-    }
-  }
-  return newest;
-}
-
-// The checkpoint is written before the command is sent: a planner killed in between has answered nobody, and
-// the next one must give that answer.
-TEST(Restart, APlannerKilledBeforeItSpokeIsAnsweredFor) {
-  const std::string folder = testing::TempDir() + "/hamel-spoke-" + std::to_string(getpid());
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
-  const auto sent = answer(folder, 0, 9, 7);
-  const auto again = answer(folder, 9, 9, 8);  // the arm still waits at the same state
-  ASSERT_EQ(sent.step, 9u);
-  ASSERT_EQ(again.step, 9u);
-  EXPECT_EQ(std::memcmp(sent.torque.data(), again.torque.data(), 4 * sizeof(double)), 0);
-  EXPECT_EQ(again.epoch, sent.epoch + 1);
-  const auto next = answer(folder, 10, 10, 9);
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
-  const auto never_killed = answer(folder, 0, 10, 10);
-  EXPECT_EQ(std::memcmp(next.torque.data(), never_killed.torque.data(), 4 * sizeof(double)), 0);
-  std::filesystem::remove_all(folder);
-}
-
 // One wrong sample of an arm is not answered; an arm that stays where it leapt to is believed.
 TEST(Planner, PassesOverASampleThatNoJointCouldReach) {
   const auto n = node(11);
@@ -322,12 +135,7 @@ TEST(Planner, PassesOverASampleThatNoJointCouldReach) {
   ASSERT_TRUE(sets.publish(none));
   std::vector<std::uint64_t> answered;
   const auto say = [&](std::uint64_t step, double leap) {
-    wire::ArmState state;
-    state.arm = s.arm, state.incarnation = 1, state.step = step, state.dt_s = 1e-3;
-    state.t_s = 1e-3 * static_cast<double>(step);
-    state.position = s.q0.array() + leap;
-    state.velocity = state.momentum = state.torque_applied = wire::JointVector::Zero(7);
-    ASSERT_TRUE(states.publish(state));
+    ASSERT_TRUE(states.publish(test::arm_state(step, s.q0.array() + leap, s.arm)));
     brain.value()->poll(Clock::now());
     wire::TorqueCommand c;
     while (commands.take(c)) answered.push_back(c.step);

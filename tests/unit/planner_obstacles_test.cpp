@@ -49,9 +49,6 @@ TEST(UnknownVelocity, JumpsAndGapsAreNoMotion) {
   EXPECT_EQ(obstacles.velocities_unknown(), 1);
 }
 
-// A sphere that flies at the first link, which hardly any joint can move out of its way, must not throw the
-// other links about: the operational inertia of such a point is nearly singular.  The powerless mapping of
-// the obstacle's own velocity would ask for 2,300 to 26,500 rad/s^2 here.
 // The same sight again, told as older or younger because another source spoke, changes no speed.
 TEST(UnknownVelocity, IsMadeOutFromTheTimesOfTheSightsAlone) {
   scene::PlannerOptions o;
@@ -69,6 +66,9 @@ TEST(UnknownVelocity, IsMadeOutFromTheTimesOfTheSightsAlone) {
   EXPECT_NEAR(obstacles.items()[0].now.V_WO[3], 0.5, 1e-12);
 }
 
+// A sphere that flies at the first link, which hardly any joint can move out of its way, must not throw the
+// other links about: the operational inertia of such a point is nearly singular.  The powerless mapping of
+// the obstacle's own velocity would ask for 2,300 to 26,500 rad/s^2 here.
 TEST(MovingObstacle, AtTheShoulderDoesNotThrowTheArmAbout) {
   const scene::Robot robot = planar_arm(4, 1.0 / 12, 0.05);
   scene::PlannerOptions o;
@@ -89,6 +89,31 @@ TEST(MovingObstacle, AtTheShoulderDoesNotThrowTheArmAbout) {
 }
 
 // Whatever the state: the command with the compensation of gravity stays within the joints' strength.
+TEST(MovingObstacle, GoesOnAheadOfACycleAsItDoesWithAge) {
+  const scene::Robot robot = planar_arm(1, 1.0 / 12, 0.05);
+  scene::PlannerOptions o;
+  o.rho0_m = 1;
+  planner::Arm arm(robot.chain);
+  arm.update(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+  geometry::Obstacle rod = sphere(1, {0.5, 0.8, 0}, 0, {0.1, -0.2, 0});
+  rod.shape = {geometry::ShapeKind::capsule, {0.05, 1, 0}};
+  rod.X_WO.R << 0, 0, 1, 0, 1, 0, -1, 0, 0;  // along x
+  rod.V_WO[2] = 1;
+  Memory memory;
+  Obstacles now, later;
+  now.take({&rod, 1}, 0, 0, o, memory);
+  later.take({&rod, 1}, 0.3, 0.3, o, memory);
+  planner::Pairs ahead(robot, o), aged(robot, o);
+  ahead.find(arm, now);
+  aged.find(arm, later);
+  ASSERT_EQ(ahead.items().size(), 1u);
+  ASSERT_EQ(aged.items().size(), 1u);
+  const double before_m = ahead.items()[0].d;
+  ahead.advance(arm, 0.3);
+  EXPECT_NEAR(ahead.items()[0].d, aged.items()[0].d, 1e-12);
+  EXPECT_LT(ahead.items()[0].d, before_m - 0.06 - 0.1) << "it goes and it turns";
+}
+
 TEST(TorqueLimits, HoldForTheSumWithGravity) {
   Random rng(4);
   for (int k = 0; k < 200; ++k) {
