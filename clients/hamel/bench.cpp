@@ -188,7 +188,7 @@ int bench_planner(const BenchArgs& args) {
   }
   std::erase_if(all, [](const CellTally& c) { return c.tallies.front().size() == 0; });
   if (args.json) {
-    print_json(all, settings_text(args));
+    print_json(all, settings_text(args), interrupted);
   } else {
     fmt::print("hamel bench planner: model {}, seed {}, dt {:g} s{}\n", args.model, args.seed, args.dt_s,
                args.velocities_unknown ? ", obstacles' velocities unknown" : "");
@@ -200,7 +200,7 @@ int bench_planner(const BenchArgs& args) {
     if (const auto p =
             draw_rates(args.plot_path, fmt::format("hamel bench planner, seed {}", args.seed), all))
       return runtime::complain("hamel bench", {*p});
-  if (interrupted) fmt::print(stderr, "interrupted: these are the scenes that were done\n");
+  if (interrupted) say_interrupted("scenes");
   return interrupted ? runtime::kInterrupted : runtime::kDone;
 }
 
@@ -241,18 +241,11 @@ BenchVerb::BenchVerb(CLI::App& app) {
       ->check(CLI::IsMember({"prototype", "full"}))
       ->capture_default_str();
   planner_->add_option("--dt", args_.dt_s, "step of arm and planner")
-      ->check(CLI::Range(1e-5, 0.05) & CLI::Validator(
-                                           [](const std::string& text) {
-                                             double v = 0;
-                                             return CLI::detail::lexical_cast(text, v) && v == v
-                                                        ? ""
-                                                        : "NaN is no step";
-                                           },
-                                           "", "number"))
+      ->check(runtime::between(1e-5, 0.05))
       ->type_name("SECONDS")
       ->capture_default_str();
   planner_->add_option("--latency", args_.latency_s, "age of what the planner is told of the obstacles")
-      ->check(CLI::Range(0.0, 10.0))
+      ->check(runtime::between(0, 10))
       ->type_name("SECONDS");
   planner_->add_flag("--velocity-unknown", args_.velocities_unknown,
                      "the planner is not told how obstacles move");

@@ -80,9 +80,15 @@ void print_table(const std::vector<CellTally>& all) {
       "median total variation of qdd [rad/s^2 a second].\n");
 }
 
-void print_json(const std::vector<CellTally>& all, const std::string& settings) {
+void say_interrupted(const char* things) {
+  fmt::print(stderr, "interrupted: these are the {} that were done\n", things);
+}
+
+void print_json(const std::vector<CellTally>& all, const std::string& settings, bool interrupted) {
   json out;
   out["settings"] = json::parse(settings);
+  out["interrupted"] = interrupted;
+  out["cells"] = json::array();
   for (const CellTally& c : all) {
     json cell{{"family", c.cell.family}, {"spheres", c.cell.spheres}, {"variant", c.cell.variant}};
     for (std::size_t k = 0; k < c.methods.size(); ++k)

@@ -21,7 +21,9 @@ struct CellTally {
 /// "panda_static 16" or "example_5_2, damping 0.5, vmax 1".
 std::string label(const Cell& cell);
 void print_table(const std::vector<CellTally>& all);
-void print_json(const std::vector<CellTally>& all, const std::string& settings);
+void print_json(const std::vector<CellTally>& all, const std::string& settings, bool interrupted);
+/// To standard error, behind what was done until then.
+void say_interrupted(const char* things);
 /// A line for each trial.
 std::optional<Problem> write_csv(const std::string& path, const std::vector<CellTally>& all);
 /// Rates of reaching and of collision, a group of bars for each cell.

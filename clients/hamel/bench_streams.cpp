@@ -11,6 +11,7 @@
 
 #include "clients/hamel/batch.h"
 #include "clients/hamel/bench_families.h"
+#include "clients/hamel/bench_output.h"
 #include "clients/hamel/progress.h"
 #include "clients/hamel/trial.h"
 #include "common/files/scene_text.h"
@@ -219,7 +220,9 @@ int bench_streams(const BenchArgs& args, const std::function<bool()>& stop) {
     print_json(recordings.value(), names, rows);
   else
     print_rows(recordings.value(), names, rows);
-  return stop() ? runtime::kInterrupted : runtime::kDone;
+  if (!stop()) return runtime::kDone;
+  say_interrupted("runs");
+  return runtime::kInterrupted;
 }
 
 }  // namespace hamel::client

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "clients/hamel/unpacked.h"
@@ -83,11 +84,16 @@ class CsvRows {
       if (!column_.contains(name))
         return Problem{path_ + ":1", fmt::format("has no column {}: written by hamel run --csv?", name)};
     while (column_.contains(fmt::format("q{}", joints_ + 1))) ++joints_;
+    const auto words = [&](const auto& column) {
+      return words_.contains(column.second) && is_read(column.first);
+    };
     std::vector<Row> rows;
     for (int number = 2; std::getline(in, line); ++number) {
       if (!cells_of(line))
         return Problem{fmt::format("{}:{}", path_, number),
                        fmt::format("has {} cells, the header {}", cells_.size(), column_.size())};
+      if (const auto bad = std::find_if(column_.begin(), column_.end(), words); bad != column_.end())
+        return Problem{fmt::format("{}:{}", path_, number), bad->first + " is not a number"};
       rows.push_back(row());
     }
     if (rows.empty()) return Problem{path_, "has no rows"};
@@ -97,9 +103,20 @@ class CsvRows {
  private:
   bool cells_of(const std::string& line) {
     cells_.clear();
+    words_.clear();
     std::istringstream in(line);
-    for (std::string cell; std::getline(in, cell, ',');) cells_.push_back(std::strtod(cell.c_str(), nullptr));
+    for (std::string cell; std::getline(in, cell, ',');) {
+      char* end = nullptr;
+      const double value = std::strtod(cell.c_str(), &end);
+      if (end == cell.c_str() || *end != '\0') words_.insert(cells_.size());
+      cells_.push_back(value);
+    }
     return cells_.size() == column_.size();
+  }
+  static bool is_read(const std::string& name) {
+    static const std::set<std::string> others{"t_s",         "ee_x_m",   "ee_y_m",    "ee_z_m",
+                                              "clearance_m", "energy_J", "iterations"};
+    return others.contains(name) || (name.size() > 1 && name[0] == 'q' && std::isdigit(name[1]));
   }
   double at(const char* name) const { return cells_[column_.at(name)]; }
   Row row() const {
@@ -115,6 +132,7 @@ class CsvRows {
   std::map<std::string, std::size_t> column_;
   int joints_ = 0;
   std::vector<double> cells_;
+  std::set<std::size_t> words_;  ///< cells that are no numbers
 };
 
 Checked<Course> course_of_csv(const CourseOptions& o) {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "clients/hamel/explain_cost.h"
@@ -53,8 +52,9 @@ void print_reductions(const Explained& e) {
 
 void print_costs(const Explained& e) {
   const auto row = [&](const std::string& name, const StepCost& c) {
-    fmt::print("  {:<20} {:>12.3f} {:>12.3f} {:>12.3f} {:>8.2f} {:>14.1e}\n", name, c.dynamics_us,
-               c.planner_us, c.total_us(), c.total_us() / e.full_cost.total_us(), c.joint_error);
+    fmt::print("  {:<20} {:>12.3f} {:>12} {:>12.3f} {:>8.2f} {:>14.1e}\n", name, c.dynamics_us,
+               e.written.steered ? fmt::format("{:.3f}", c.planner_us) : "-", c.total_us(),
+               c.total_us() / e.full_cost.total_us(), c.joint_error);
   };
   fmt::print("\n  {:<20} {:>12} {:>12} {:>12} {:>8} {:>14}\n", "cost of a step [us]", "dynamics", "planner",
              "both", "of full", "joints [rad]");
@@ -85,8 +85,10 @@ void print_choice(const Explained& e) {
   fmt::print("\n");
 }
 
-Json json_of(const StepCost& c) {
-  return {{"dynamics_us", c.dynamics_us}, {"planner_us", c.planner_us}, {"joint_error", c.joint_error}};
+Json json_of(const StepCost& c, bool steered) {
+  return {{"dynamics_us", c.dynamics_us},
+          {"planner_us", steered ? Json(c.planner_us) : Json(nullptr)},
+          {"joint_error", c.joint_error}};
 }
 
 Json before_after(double before, double after) { return {{"before", before}, {"after", after}}; }
@@ -118,8 +120,10 @@ Json json_of(const Explained& e) {
       j["bounds"].push_back(
           {{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}, {"measured", measured(e, r.name)}});
   }
-  j["cost_per_step"] = {{"full", json_of(e.full_cost)}, {"reduced", json_of(e.reduced_cost)}};
-  for (const ReductionCost& r : e.each) j["cost_per_step"]["without " + r.name] = json_of(r.without);
+  j["cost_per_step"] = {{"full", json_of(e.full_cost, s.steered)},
+                        {"reduced", json_of(e.reduced_cost, s.steered)}};
+  for (const ReductionCost& r : e.each)
+    j["cost_per_step"]["without " + r.name] = json_of(r.without, s.steered);
   j["measured_error"] =
       e.choosing && e.choosing->chosen ? e.choosing->chosen->joint_error : e.reduced_cost.joint_error;
   return j;
@@ -140,8 +144,6 @@ void print_text(const Explained& e) {
 
 int explain(const ExplainArgs& args) {
   runtime::start_log("hamel", false);
-  if (!std::isfinite(args.seconds))
-    return runtime::complain("hamel explain", {{"--seconds", "must be finite"}});
   std::vector<scene::Scene> scenes;
   for (const std::string& path : args.scene_paths) {
     auto s = files::read_scene(path, args.overrides);

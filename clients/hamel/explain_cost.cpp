@@ -38,6 +38,7 @@ std::uint64_t round(Variant& v, std::uint64_t steps, const trade::Watch& watch) 
     if (first) v.q.push_back(ticks.arm().state().q);
   }
   if (k == 0) return 0;
+  if (!v.scene.steered) plan_s = 0;
   v.cost.planner_us = std::min(v.cost.planner_us, 1e6 * plan_s / static_cast<double>(k));
   v.cost.dynamics_us = std::min(v.cost.dynamics_us, 1e6 * step_s / static_cast<double>(k));
   return k;

@@ -1,7 +1,6 @@
 /// hamel: the command line.
 
 #include <cerrno>
-#include <cmath>
 #include <system_error>
 
 #include "clients/hamel/batch_verb.h"
@@ -41,16 +40,6 @@ void add_run_like(CLI::App& app, client::RunArgs& a) {
 }
 
 /// record and log: their options, and what to do when they were asked for.
-/// CLI11's own checks let "nan" pass.
-const CLI::Validator kFinite(
-    [](const std::string& text) {
-      double value = 0;
-      return CLI::detail::lexical_cast(text, value) && std::isfinite(value)
-                 ? std::string()
-                 : text + " is not a finite number";
-    },
-    "", "finite");
-
 class RecordVerbs {
  public:
   explicit RecordVerbs(CLI::App& app) {
@@ -59,8 +48,7 @@ class RecordVerbs {
     record_->add_option("--compression", record_args_.compression, "none, lz4 or zstd")
         ->capture_default_str();
     record_->add_option("--duration", record_args_.duration_s, "end after so many seconds")
-        ->check(kFinite)
-        ->check(CLI::PositiveNumber);
+        ->check(runtime::positive());
     record_->add_option("--scene", record_args_.scene_path,
                         "scene of the run, kept in the recording for replays");
     add_overrides(*record_, record_args_.overrides, "overrides of the run");
@@ -105,10 +93,10 @@ class RecordVerbs {
     verb.add_option("--topic", log_args_.topic, "one topic: state, command, obstacles, report, ...");
     verb.add_option("--start", log_args_.begin_s, "from this time of the run on")
         ->type_name("SECONDS")
-        ->check(kFinite);
+        ->check(runtime::finite());
     verb.add_option("--until", log_args_.end_s, "up to this time of the run")
         ->type_name("SECONDS")
-        ->check(kFinite);
+        ->check(runtime::finite());
   }
 
   void add_replay(CLI::App& app) {
@@ -139,15 +127,14 @@ class RecordVerbs {
         ->allow_extra_args(false)
         ->capture_default_str();
     play_->add_option("--rate", play_args_.rate, "recorded seconds a second")
-        ->check(kFinite)
-        ->check(CLI::PositiveNumber)
+        ->check(runtime::positive())
         ->capture_default_str();
     play_->add_option("--start", play_args_.begin_s, "from this time of the run on")
         ->type_name("SECONDS")
-        ->check(kFinite);
+        ->check(runtime::finite());
     play_->add_option("--until", play_args_.end_s, "up to this time of the run")
         ->type_name("SECONDS")
-        ->check(kFinite);
+        ->check(runtime::finite());
     play_->add_flag("--loop", play_args_.loop, "begin anew at the end, until Ctrl-C");
     play_->add_flag("--control", play_args_.control,
                     "obey standard input: pause, resume, step, quit, or the keys space . q");
@@ -186,15 +173,15 @@ CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
       ->type_name("MODEL|SCENE");
   add_overrides(*trade, a.overrides, "override a field of the scene; repeat");
   trade->add_option("--horizon", a.horizon_s, "seconds of motion instead of the scene's")
-      ->check(CLI::PositiveNumber)
+      ->check(runtime::positive())
       ->type_name("SECONDS");
   trade->add_option("--tick", a.tick_s, "try no step longer than this control tick")
-      ->check(CLI::PositiveNumber)
+      ->check(runtime::positive())
       ->type_name("SECONDS");
   trade
       ->add_option("--accuracy", a.accuracy,
                    "recommend tier and dt that keep every joint within this [rad or m]")
-      ->check(CLI::PositiveNumber);
+      ->check(runtime::positive());
   trade->add_option("--by", a.by, "what counts as cost: time or evaluations")
       ->check(CLI::IsMember({"time", "evaluations"}))
       ->capture_default_str();
@@ -234,7 +221,7 @@ CLI::App* add_explain(CLI::App& app, client::ExplainArgs& a) {
                  "speed against accuracy instead: full, exact and fastest fidelity of each scene, Markdown")
       ->excludes(json);
   explain->add_option("--seconds", a.seconds, "CPU time for each measurement of cost")
-      ->check(CLI::PositiveNumber)
+      ->check(runtime::positive())
       ->capture_default_str();
   return explain;
 }
@@ -296,7 +283,7 @@ int verbs(int argc, char** argv) {
   auto* status = app.add_subcommand("status", "who runs, which version, how it fares");
   status->add_option("--seconds", status_args.seconds, "how long to listen")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(runtime::positive());
   status->add_flag("--json", status_args.json, "one JSON object on stdout");
   runtime::add_bus_options(*status, status_args.bus);
 

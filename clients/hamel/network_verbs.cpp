@@ -29,7 +29,7 @@ void NetworkVerbs::add_bench(CLI::App& app) {
       ->check(CLI::Range(1, 10000000))
       ->capture_default_str();
   bench_bus_->add_option("--rate", bench_args_.rate_hz, "questions a second; 0: one after the other")
-      ->check(CLI::NonNegativeNumber)
+      ->check(runtime::between(0, 1e6))
       ->capture_default_str();
   bench_bus_->add_option("--domain", bench_args_.domain, "DDS domain")->capture_default_str();
   bench_bus_->add_option("--only", bench_args_.only, "this part")
@@ -46,7 +46,7 @@ CLI::App* NetworkVerbs::add_topic(const char* name, const char* help, bool named
   if (named) verb->add_option("topic", topic_args_.topic, "state, command, obstacles, report, ...");
   verb->add_option("--seconds", topic_args_.seconds, "how long to listen; echo: to wait for the first")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(runtime::positive());
   verb->add_flag("--json", topic_args_.json, "for machines");
   runtime::add_bus_options(*verb, topic_args_.bus);
   return verb;

@@ -23,7 +23,20 @@ struct View {
   int across, up;
   const char* label_across;
   const char* label_up;
+  Eigen::Array2d least{HUGE_VAL, HUGE_VAL}, most{-HUGE_VAL, -HUGE_VAL};  ///< of what is drawn
+
+  void cover(double x, double y) {
+    least = least.min(Eigen::Array2d(x, y));
+    most = most.max(Eigen::Array2d(x, y));
+  }
+  double span() const { return (most - least).maxCoeff(); }
 };
+
+/// A step of 1, 2 or 5 times a power of ten that parts `span` into three to eight.
+double tic_step(double span) {
+  const double third = span / 3, ten = std::pow(10, std::floor(std::log10(third)));
+  return third >= 5 * ten ? 5 * ten : third >= 2 * ten ? 2 * ten : ten;
+}
 
 bool has_target(const Course& c) {
   return c.scene && c.scene->goal && c.scene->goal->kind != scene::GoalKind::joints;
@@ -105,9 +118,10 @@ class Picture {
       const Row& r = c_.rows[static_cast<std::size_t>(part * static_cast<double>(c_.rows.size() - 1))];
       rbd::positions(chain, r.q, ws);
       const auto& base = chain.X_WB0().p;
-      s_.add("{} {}\n", base[v.across], base[v.up]);
-      for (const auto& X : ws.X_WB) s_.add("{} {}\n", X.p[v.across], X.p[v.up]);
-      s_.add("{} {}\n\n", r.tip_m[v.across], r.tip_m[v.up]);
+      point(i, base[v.across], base[v.up]);
+      for (const auto& X : ws.X_WB) point(i, X.p[v.across], X.p[v.up]);
+      point(i, r.tip_m[v.across], r.tip_m[v.up]);
+      s_.add("\n");
     }
     s_.add("EOD\n");
   }
@@ -118,14 +132,22 @@ class Picture {
       for (const auto& o : set) {
         const auto points = outline(o, grow_m, views_[i].across, views_[i].up);
         has_outlines_ |= !points.empty();
-        for (const auto& [x, y] : points) s_.add("{} {}\n", x, y);
+        for (const auto& [x, y] : points) point(i, x, y);
         s_.add("\n");
       }
     s_.add("EOD\n");
   }
 
+  void point(std::size_t i, double x, double y) {
+    s_.add("{} {}\n", x, y);
+    views_[i].cover(x, y);
+  }
+
   void path_panel(std::size_t i) {
-    const View& v = views_[i];
+    View& v = views_[i];
+    for (const Row& r : c_.rows) v.cover(r.tip_m[v.across], r.tip_m[v.up]);
+    // Both axes have one scale: labels of one step do not meet on the shorter one either.
+    if (std::isfinite(v.span()) && v.span() > 0) s_.add("set xtics {0:g}\nset ytics {0:g}\n", tic_step(v.span()));
     s_.add(
         "set size ratio -1\nset yrange [*:*]\nset key outside bottom center horizontal\nset xlabel '{} "
         "[m]'\nset ylabel '{} [m]'\nplot ",
@@ -151,7 +173,9 @@ class Picture {
                        [&](const Row& r) { return std::isfinite(r.*member); });
   }
   void panel(const std::string& kind) {
-    s_.add("set size noratio\nset xlabel 't [s]'\nset yrange [*:*]\nset key outside top center vertical\n");
+    s_.add(
+        "set size noratio\nset xtics autofreq\nset ytics autofreq\nset xlabel 't [s]'\nset yrange [*:*]\nset "
+        "key outside top center vertical\n");
     if (kind == "clearance") {
       s_.add("set ylabel '[m]'\nplot 0 lc rgb '#888888' notitle");
       line(any(&Row::error_m), 6, "#228833", "distance to target");

@@ -30,6 +30,9 @@ nlohmann::ordered_json text(const std::string& s) {
 void print_json(const scene::Scene& scene, const Outcome& o) {
   nlohmann::ordered_json j;
   j["scene"] = scene.name;
+  j["method"] = scene.steered ? nlohmann::ordered_json(scene::to_string(scene.planner.method)) : nullptr;
+  j["tier"] = scene::to_string(scene.dynamics.tier);
+  j["dt_s"] = scene.dynamics.dt_s;
   j["outcome"] = o.outcome;
   j["reason"] = text(o.reason);
   j["detail"] = text(o.detail);

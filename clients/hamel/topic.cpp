@@ -247,7 +247,7 @@ int topic_latency(const TopicArgs& args) {
   wire::Subscription<wire::TorqueCommand> commands(n);
   std::unordered_map<std::uint64_t, Clock::time_point> seen;
   std::vector<double> ms;
-  std::uint64_t unanswered = 0;
+  std::uint64_t unanswered = 0;  // from the first answer on: before it the two ends had not met
   wire::ArmState s;
   wire::TorqueCommand c;
   const std::uint32_t arm = args.arm.value_or(1);
@@ -255,12 +255,13 @@ int topic_latency(const TopicArgs& args) {
   while (Clock::now() < deadline) {
     while (states.take(s)) {
       if (s.arm != arm) continue;
-      if (seen.size() > 4096) unanswered += seen.size(), seen.clear();
+      if (seen.size() > 4096) unanswered += ms.empty() ? 0 : seen.size(), seen.clear();
       seen.try_emplace(s.step, Clock::now());
     }
     while (commands.take(c)) {
       const auto asked = c.arm == arm ? seen.find(c.step) : seen.end();
       if (asked == seen.end()) continue;
+      if (ms.empty()) std::erase_if(seen, [&](const auto& state) { return state.first < c.step; });
       ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - asked->second).count());
       seen.erase(asked);
     }

@@ -5,12 +5,39 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
 #include "common/wire/codec.h"
 
 namespace hamel::runtime {
+
+namespace {
+
+CLI::Validator number_that(const std::function<bool(double)>& holds, const std::string& rule) {
+  const auto check = [=](const std::string& text) {
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && holds(value);
+    return good ? std::string() : text + " is not a " + rule;
+  };
+  return CLI::Validator(check, "", "number");
+}
+
+}  // namespace
+
+CLI::Validator finite() {
+  return number_that([](double) { return true; }, "finite number");
+}
+
+CLI::Validator positive() {
+  return number_that([](double v) { return v > 0 && v <= 1e9; }, "number > 0 and <= 1e9");
+}
+
+CLI::Validator between(double low, double high) {
+  return number_that([=](double v) { return v >= low && v <= high; },
+                     fmt::format("number in [{:g}, {:g}]", low, high));
+}
 
 void add_bus_options(CLI::App& app, BusOptions& o) {
   app.add_option("--bus", o.vendor, "inproc, fastdds or cyclonedds")->type_name("VENDOR");
@@ -37,7 +64,7 @@ void add_run_options(CLI::App& app, RunOptions& o) {
                          "paced by the clock: latest command, stale input is a named state");
   l->excludes(r);
   app.add_option("--duration", o.duration_s, "seconds of simulated time instead of the scene's")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->type_name("SECONDS");
   app.add_option("--state-dir", o.state_dir, "folder of the checkpoints that a restart resumes from");
   app.add_flag("-v,--verbose", o.verbose, "log more");
@@ -56,7 +83,7 @@ void add_service_options(CLI::App& app, RunOptions& o) {
       ->check(CLI::Range(0u, 65535u));
   app.add_option("--readers", o.readers,
                  "begin when so many readers are there (a recorder among them), or after 5 s")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, 1000000))
       ->type_name("N");
 }
 
@@ -81,10 +108,13 @@ void append(const RealtimeOptions& o, std::vector<std::string>& command) {
 Checked<scene::Scene> load(const RunOptions& o) {
   auto s = files::load_scene(o.scene_path, o.overrides);
   if (!s) return s;
-  if (!(o.duration_s <= 1e9)) return Problems{{"--duration", "must be at most 1e9 s"}};
   if (o.duration_s > 0) s.value().duration_s = o.duration_s;
   if (s.value().duration_s / s.value().dynamics.dt_s > 1e15)
     return Problems{{o.scene_path, "duration_s / dynamics.dt_s must be at most 1e15 steps"}};
+  if (s.value().duration_s < s.value().dynamics.dt_s)
+    return Problems{
+        {o.scene_path, fmt::format("duration_s = {:g}, must be at least one step, dynamics.dt_s = {:g}",
+                                   s.value().duration_s, s.value().dynamics.dt_s)}};
   return s;
 }
 

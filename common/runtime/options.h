@@ -63,6 +63,13 @@ scene::Pace pace(const RunOptions& o, scene::Pace otherwise);
 Result<std::unique_ptr<bus::Node>, Problem> open_node(const BusOptions& o, const std::string& scene_vendor,
                                                       const std::string& name);
 
+/// Checks of numbers on a command line.  CLI11's own let NaN pass and spell out limits with 309 digits.
+CLI::Validator finite();
+/// In (0, 1e9]: a time, a rate, a tolerance.
+CLI::Validator positive();
+/// In [low, high].
+CLI::Validator between(double low, double high);
+
 /// Prints every problem to stderr as "program: where: what" and returns kBadInput.
 int complain(const std::string& program, const Problems& problems);
 

@@ -79,6 +79,22 @@ class BadInput(unittest.TestCase):
             self.assertEqual(code, 2, (args, err))
             self.assertTrue(err.strip())
 
+    def test_what_is_no_number_is_named_with_the_rule(self):
+        arm = scene("four_link_avoid")
+        for verb, option in ((["run", arm], "--duration"), (["trade", arm], "--horizon"), (["explain", arm], "--seconds"),
+                             (["topic", "hz"], "--seconds"), (["status"], "--seconds"), (["bench", "planner"], "--dt"),
+                             (["bench", "planner"], "--latency"), (["play", "x.mcap"], "--rate"), (["bench", "bus"], "--rate")):
+            for wrong in ("abc", "nan", "-1", "1e300"):
+                with self.subTest((verb[0], option, wrong)):
+                    code, _, err = hamel(*verb, option, wrong)
+                    self.assertEqual(code, 2, err)
+                    self.assertIn(f"{option}: {wrong} is not a number ", err)
+                    self.assertLess(len(err), 200)
+
+    def test_a_run_shorter_than_a_step(self):
+        self.refused("run", scene("four_link_avoid"), "--duration", "1e-9",
+                     says=["duration_s = 1e-09", "at least one step", "dynamics.dt_s = 0.001"])
+
     def test_an_interface_that_does_not_exist_or_is_down(self):
         for vendor in ("fastdds", "cyclonedds"):
             for verb in ("run", "up"):

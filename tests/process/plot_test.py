@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Pictures of runs: from a recording and from a CSV, of every kind."""
 
+import re
 import shutil
 import unittest
+from xml.etree import ElementTree
 
 from programs import hamel, main, scene
 from recordings import SHORT, Files
@@ -45,6 +47,35 @@ class Plot(Files):
         code, _, err = hamel("plot", table, "-o", self.folder / "x.svg", "--scene", scene("panda_reach"))
         self.assertEqual(code, 2)
         self.assertIn("has 4 joints", err)
+
+    def test_a_csv_with_a_word_for_a_number_is_refused(self):
+        table = self.folder / "run.csv"
+        code, _, err = hamel("run", scene("four_link_avoid"), "--csv", table, *SHORT)
+        self.assertEqual(code, 3, err)
+        lines = table.read_text().splitlines()
+        names, cells = lines[0].split(","), lines[4].split(",")
+        for column in ("t_s", "q2", "ee_y_m", "energy_J"):
+            spoiled = list(cells)
+            spoiled[names.index(column)] = "abc"
+            table.write_text("\n".join([*lines[:4], ",".join(spoiled), *lines[5:]]) + "\n")
+            code, _, err = hamel("plot", table, "-o", self.folder / "x.svg")
+            self.assertEqual((code, err), (2, f"hamel plot: {table}:5: {column} is not a number\n"))
+
+    def test_labels_of_the_axes_do_not_meet(self):
+        """Both axes of the path have one scale, and one of them may be short."""
+        file, _ = self.recorded("panda_reach", *SHORT)
+        picture = ElementTree.fromstring(self.drawn(file, "--kind", "path"))
+        below = {}
+        for g in picture.iter("{http://www.w3.org/2000/svg}g"):
+            at = re.match(r"translate\(([-\d.]+),([-\d.]+)\)", g.get("transform", ""))
+            text = "".join(g.itertext()).strip()
+            if at and re.fullmatch(r"-?[\d.]+", text) and 'middle' in ElementTree.tostring(g, "unicode"):
+                below.setdefault(float(at[2]), []).append((float(at[1]), text))
+        self.assertTrue(below)
+        for labels in below.values():
+            labels.sort()
+            for (x, text), (other, more) in zip(labels, labels[1:]):
+                self.assertGreater(other - x, 3.5 * (len(text) + len(more)), labels)
 
     def test_a_free_arm_shows_its_energy(self):
         file, _ = self.recorded("three_link_swing", *SHORT)

@@ -31,6 +31,7 @@ class Explain(unittest.TestCase):
         self.assertEqual(j["obstacles"], {"before": 1, "after": 1})
         self.assertEqual(j["bounds"], [])
         self.assertIn("without plane", j["cost_per_step"])
+        self.assertGreater(j["cost_per_step"]["full"]["planner_us"], 0)
         self.assertLess(j["measured_error"], 1e-9)
         self.assertTrue(all(r["why"] and r["what"] for r in j["reductions"]))
 
@@ -80,6 +81,7 @@ class Fastest(unittest.TestCase):
         j = json.loads(out)
         self.assertLessEqual(j["measured_error"], 1e-5)
         self.assertEqual([b["name"] for b in j["bounds"]], ["step"])
+        self.assertIsNone(j["cost_per_step"]["full"]["planner_us"], "nothing is steered")
         code, o = outcome("run", scene("three_link_swing"), "--set", "fidelity=fastest", "--set", "duration_s=10",
                           "--set", "accuracy.joint_error_rad=1e-5")
         self.assertEqual(code, 0)

@@ -2,10 +2,14 @@
 """`hamel run` on the shipped scenes: the figures of the paper and of the acceptance list."""
 
 import csv
+import json
+import os
+import signal
+import subprocess
 import tempfile
 import unittest
 
-from programs import hamel, main, outcome, scene
+from programs import BIN, DEADLINE_S, hamel, main, outcome, scene
 
 
 class Swing(unittest.TestCase):
@@ -15,6 +19,7 @@ class Swing(unittest.TestCase):
         code, o = outcome("run", scene("three_link_swing"))
         self.assertEqual(code, 0)
         self.assertEqual(o["outcome"], "DONE")
+        self.assertEqual((o["method"], o["tier"], o["dt_s"]), (None, "midpoint", 0.01))
         self.assertEqual(o["steps"], 10000)
         self.assertLessEqual(o["energy_drift_rel"], 1e-5)
         self.assertGreater(o["energy_drift_rel"], 1e-7)  # it is second order at dt 0.01, not exact
@@ -69,6 +74,7 @@ class FourLink(unittest.TestCase):
     def test_the_paper_reaches_past_the_obstacle(self):
         code, o = outcome("run", scene("four_link_avoid"))
         self.assertEqual((code, o["outcome"], o["contacts"]), (0, "REACHED", 0))
+        self.assertEqual((o["method"], o["tier"], o["dt_s"]), ("gyro_paper", "midpoint", 0.001))
         self.assertAlmostEqual(o["time_to_goal_s"], 5.5, delta=0.3)
         self.assertAlmostEqual(o["min_clearance_m"], 0.187, delta=0.01)
         self.assertLess(o["final_error_m"], 1e-9)
@@ -113,6 +119,21 @@ class Outputs(unittest.TestCase):
     def test_a_planner_that_overflows_is_unsafe_and_heard(self):
         code, o = outcome("run", scene("four_link_avoid"), "--set", "planner.kp=1e308", "--duration", "0.1")
         self.assertEqual((code, o["outcome"]), (1, "UNSAFE"), o)
+
+
+class Bench(unittest.TestCase):
+    def test_an_interrupted_one_says_so_in_its_figures(self):
+        command = [BIN / "hamel", "bench", "planner", "--family", "planar_static", "--methods", "gyro", "--json", "--scenes"]
+        done = subprocess.run([*command, "1"], capture_output=True, text=True, timeout=DEADLINE_S)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIs(json.loads(done.stdout)["interrupted"], False)
+        endless = subprocess.Popen([*command, "100000"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while len(os.listdir(f"/proc/{endless.pid}/task")) < 2:  # until it works
+            self.assertIsNone(endless.poll())
+        endless.send_signal(signal.SIGINT)
+        out, err = endless.communicate(timeout=DEADLINE_S)
+        self.assertEqual(endless.returncode, 130, err)
+        self.assertIs(json.loads(out)["interrupted"], True)
 
 
 class Panda(unittest.TestCase):
