@@ -12,6 +12,7 @@
 #include "clients/hamel/outputs.h"
 #include "clients/hamel/progress.h"
 #include "clients/hamel/variations.h"
+#include "common/base/hash.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
@@ -89,8 +90,7 @@ std::string row(const Variations& v, std::size_t i, const VariationResult& r) {
 std::string job_name(const scene::Scene& s, const Variations& v) {
   std::uint64_t h = scene::fingerprint(s);
   for (std::size_t i = 0; i < v.size(); ++i)
-    for (const std::string& x : v.overrides(i))
-      for (const char c : x + '\n') h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+    for (const std::string& x : v.overrides(i)) h = hashed(x + '\n', h);
   return fmt::format("hamel batch of {}, {} variations, {:016x}, {}", s.name, v.size(), h,
                      runtime::version());
 }

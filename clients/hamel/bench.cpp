@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +12,7 @@
 #include "clients/hamel/outputs.h"
 #include "clients/hamel/problems.h"
 #include "clients/hamel/progress.h"
+#include "clients/hamel/timing.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
@@ -149,10 +148,6 @@ std::string settings_text(const BenchArgs& args) {
 }
 
 }  // namespace
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 int bench_planner(const BenchArgs& args) {
   runtime::StopSignal stop;

@@ -8,6 +8,7 @@
 
 #include "clients/hamel/judge.h"
 #include "clients/hamel/robots.h"
+#include "common/base/hash.h"
 #include "common/base/random.h"
 #include "common/files/urdf.h"
 #include "common/rbd/rbd.h"
@@ -35,11 +36,6 @@ class Dice : public SplitMix64 {
     }
   }
 };
-
-std::uint64_t hash(const std::string& text, std::uint64_t h) {
-  for (const char c : text) h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return h;
-}
 
 bool is_planar(const Cell& cell) { return cell.family.starts_with("planar") || cell.family == "example_5_2"; }
 bool is_moving(const Cell& cell) { return cell.family.ends_with("moving"); }
@@ -296,8 +292,8 @@ Checked<BenchRobots> bench_robots(ArmModel model) {
 }
 
 scene::Scene draw_scene(const Cell& cell, const BenchRobots& robots, std::uint64_t seed, std::size_t index) {
-  std::uint64_t h = hash(cell.family, 1469598103934665603ull ^ (seed * SplitMix64::kStep));
-  h = hash(std::to_string(cell.spheres) + "/" + std::to_string(index), h);  // variants share their scenes
+  std::uint64_t h = hashed(cell.family, kHashStart ^ (seed * SplitMix64::kStep));
+  h = hashed(std::to_string(cell.spheres) + "/" + std::to_string(index), h);  // variants share their scenes
   scene::Scene s =
       cell.family == "example_5_2" ? draw_example_5_2(robots.planar, h) : Drawing(cell, robots, h).draw();
   s.name = cell.family + "_" + std::to_string(cell.spheres) + "_" + std::to_string(index);

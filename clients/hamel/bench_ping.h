@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "clients/hamel/timing.h"
 #include "common/bus/bus.h"
 
 namespace hamel::client::ping {
@@ -106,12 +107,6 @@ struct Times {
   std::vector<double> there_us, round_us;
   int lost = 0;
 };
-
-inline double quantile(std::vector<double>& v, double q) {
-  if (v.empty()) return 0;
-  std::sort(v.begin(), v.end());
-  return v[std::min(v.size() - 1, static_cast<std::size_t>(q * static_cast<double>(v.size())))];
-}
 
 /// Asks `samples` times at `rate_hz` (0: at once after each answer); `ask(stamp)` gives the answer, or false.
 template <class Ask>

@@ -20,7 +20,6 @@ namespace hamel::client {
 int bench_streams(const BenchArgs& args, const std::function<bool()>& stop);
 
 // Shared with the other benches.
-double now_s();
 std::vector<std::string> assignments(const std::vector<std::string>& overrides, const std::string& method);
 Problems choose_methods(const BenchArgs& args, std::vector<scene::Method>& methods,
                         std::vector<std::string>& names);

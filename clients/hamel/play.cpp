@@ -73,8 +73,7 @@ class Player {
       }
       time_s_ = static_cast<double>(message->time) * 1e-9;
       const double after_s = static_cast<double>(message->time - *first) * 1e-9 / args_.rate;
-      const bool on_time =
-          wait_until(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(after_s)));
+      const bool on_time = wait_until(runtime::seconds(after_s));
       if (ended()) return false;
       writers_[message->topic]->write(message->payload);
       if (on_time) lateness_.add(std::chrono::duration<double>(Clock::now() - due_).count());

@@ -3,25 +3,18 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <utility>
 
+#include "clients/hamel/timing.h"
+
 namespace hamel::client {
-
-namespace {
-
-double clock_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-}  // namespace
 
 Progress::Progress(std::size_t of, std::string unit)
     : terminal_(isatty(STDERR_FILENO) == 1),
       of_(of),
       unit_(std::move(unit)),
-      began_s_(clock_s()),
+      began_s_(now_s()),
       last_s_(began_s_) {}
 
 Progress::~Progress() {
@@ -29,7 +22,7 @@ Progress::~Progress() {
 }
 
 void Progress::say(std::size_t done, const std::string& what) {
-  const double now = clock_s(), passed = now - began_s_;
+  const double now = now_s(), passed = now - began_s_;
   if (done < of_ && now - last_s_ < (terminal_ ? 0.2 : 10.0)) return;
   if (done == of_ && !shown_ && !terminal_) return;  // it was quick
   last_s_ = now;

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "clients/hamel/commands.h"
+#include "common/runtime/loop.h"
 #include "common/runtime/signals.h"
 #include "common/wire/endpoint.h"
 
@@ -137,8 +138,7 @@ int status(const StatusArgs& args) {
   bus::Node& n = *node.value();
   wire::Subscription<wire::ServiceStatus> sub(n);
   std::map<std::tuple<std::uint32_t, wire::ServiceKind, bus::WriterId>, wire::ServiceStatus> seen;
-  const auto deadline =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(args.seconds));
+  const auto deadline = Clock::now() + runtime::seconds(args.seconds);
   wire::ServiceStatus s;
   do {
     while (sub.take(s)) seen[{s.arm, s.kind, sub.from()}] = s;

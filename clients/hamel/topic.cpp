@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <unordered_map>
 
+#include "clients/hamel/timing.h"
+#include "common/runtime/loop.h"
 #include "common/runtime/signals.h"
 #include "common/wire/endpoint.h"
 #include "common/wire/fields.h"
@@ -35,22 +37,12 @@ int no_topic(const char* verb, const std::string& name) {
   return runtime::complain(std::string("hamel topic ") + verb, {{name, "is no topic; there are " + names}});
 }
 
-Clock::duration seconds(double s) {
-  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
-}
-
 /// The key of a payload that decodes: its first field.
 std::uint32_t key_of(const bus::Payload& p) {
   std::uint32_t key = 0;
   for (std::size_t i = 0; i < 4 && p.size() >= 8; ++i)
     key |= std::to_integer<std::uint32_t>(p[4 + (p[1] == std::byte{1} ? i : 3 - i)]) << (8 * i);
   return key;
-}
-
-double percentile(std::vector<double>& sorted, double q) {
-  if (sorted.empty()) return 0;
-  return sorted[std::min(sorted.size() - 1,
-                         static_cast<std::size_t>(q * static_cast<double>(sorted.size())))];
 }
 
 std::string show(const wire::Field& f) {
@@ -112,7 +104,7 @@ struct Pulse {
 int topic_list(const TopicArgs& args) {
   auto node = runtime::open_node(args.bus, "", "hamel-topic");
   if (!node) return runtime::complain("hamel topic list", {node.error()});
-  const auto deadline = Clock::now() + std::max<Clock::duration>(kMatch, seconds(args.seconds));
+  const auto deadline = Clock::now() + std::max<Clock::duration>(kMatch, runtime::seconds(args.seconds));
   while (Clock::now() < deadline) node.value()->wait(deadline);
   std::map<std::string, std::vector<bus::Endpoint>> topics;
   for (auto& e : node.value()->endpoints()) topics[e.topic].push_back(e);
@@ -150,7 +142,7 @@ int topic_echo(const TopicArgs& args) {
   bus::Node& n = *node.value();
   stop.on_stop([&n] { n.wake(); });
   const auto reader = n.reader(*topic);
-  const auto deadline = Clock::now() + seconds(args.seconds);
+  const auto deadline = Clock::now() + runtime::seconds(args.seconds);
   bus::Payload p;
   std::uint64_t shown = 0;
   while (!stop.requested() && (args.count == 0 || shown < args.count)) {
@@ -194,7 +186,7 @@ int topic_hz(const TopicArgs& args) {
     pulses.back().reader = n.reader(t, 0, bus::Ask::promises);
   }
   if (pulses.empty()) return no_topic("hz", args.topic);
-  const auto deadline = Clock::now() + seconds(args.seconds);
+  const auto deadline = Clock::now() + runtime::seconds(args.seconds);
   bus::Payload p;
   while (Clock::now() < deadline) {
     for (Pulse& pulse : pulses)
@@ -209,10 +201,9 @@ int topic_hz(const TopicArgs& args) {
   for (Pulse& pulse : pulses) {
     any |= pulse.messages > 0;
     if (pulse.messages == 0 && args.topic.empty()) continue;
-    std::sort(pulse.gaps_ms.begin(), pulse.gaps_ms.end());
     const auto c = pulse.reader->counters();
     const std::string name(pulse.topic->name.substr(std::string_view(kPrefix).size()));
-    const double p99 = percentile(pulse.gaps_ms, 0.99), most = percentile(pulse.gaps_ms, 1);
+    const double p99 = quantile(pulse.gaps_ms, 0.99), most = quantile(pulse.gaps_ms, 1);
     const double kB = static_cast<double>(pulse.bytes) * 1e-3 / args.seconds;
     if (args.json)
       list.push_back({{"topic", name},
@@ -251,7 +242,7 @@ int topic_latency(const TopicArgs& args) {
   wire::ArmState s;
   wire::TorqueCommand c;
   const std::uint32_t arm = args.arm.value_or(1);
-  const auto deadline = Clock::now() + seconds(args.seconds);
+  const auto deadline = Clock::now() + runtime::seconds(args.seconds);
   while (Clock::now() < deadline) {
     while (states.take(s)) {
       if (s.arm != arm) continue;
@@ -267,23 +258,22 @@ int topic_latency(const TopicArgs& args) {
     }
     n.wait(deadline);
   }
-  std::sort(ms.begin(), ms.end());
   unanswered += seen.size();
   if (args.json)
     fmt::print("{}\n", nlohmann::ordered_json{{"arm", arm},
                                               {"answers", ms.size()},
                                               {"unanswered", unanswered},
-                                              {"p50_ms", percentile(ms, 0.5)},
-                                              {"p99_ms", percentile(ms, 0.99)},
-                                              {"p999_ms", percentile(ms, 0.999)},
-                                              {"max_ms", percentile(ms, 1)}}
+                                              {"p50_ms", quantile(ms, 0.5)},
+                                              {"p99_ms", quantile(ms, 0.99)},
+                                              {"p999_ms", quantile(ms, 0.999)},
+                                              {"max_ms", quantile(ms, 1)}}
                            .dump(2));
   else if (!ms.empty())
     fmt::print(
         "state to command, arm {}: p50 {:.3f} ms, p99 {:.3f}, p99.9 {:.3f}, max {:.3f}; {} answers, {} "
         "states "
         "without one\n",
-        arm, percentile(ms, 0.5), percentile(ms, 0.99), percentile(ms, 0.999), percentile(ms, 1), ms.size(),
+        arm, quantile(ms, 0.5), quantile(ms, 0.99), quantile(ms, 0.999), quantile(ms, 1), ms.size(),
         unanswered);
   if (!ms.empty()) return runtime::kDone;
   fmt::print(stderr, "hamel topic latency: no command of arm {} answered a state within {} s on domain {}\n",

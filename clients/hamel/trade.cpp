@@ -13,6 +13,7 @@
 #include "clients/hamel/gnuplot.h"
 #include "clients/hamel/motion.h"
 #include "clients/hamel/progress.h"
+#include "clients/hamel/timing.h"
 #include "clients/hamel/trade_choice.h"
 #include "common/runtime/options.h"
 
@@ -173,9 +174,7 @@ int sweep(const TradeArgs& args, const scene::Scene& s, const runtime::StopSigna
                              .horizon_s = args.horizon_s > 0 ? args.horizon_s : s.duration_s,
                              .tick_s = args.tick_s > 0 ? args.tick_s : scene::kInf,
                              .base = s.dynamics};
-  const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch(); };
-  const trade::Watch watch{[&] { return std::chrono::duration<double>(now()).count(); },
-                           [&] { return stop.requested(); }};
+  const trade::Watch watch{now_s, [&] { return stop.requested(); }};
   const trade::Reference reference = trade::converge(motion, watch);
   std::vector<Measured> all = measure_all(args, motion, reference, watch);
   if (stop.requested()) return runtime::kInterrupted;

@@ -2,12 +2,9 @@
 
 #include <filesystem>
 
-#include "clients/hamel/chosen.h"
-#include "clients/hamel/commands.h"
-#include "clients/hamel/outputs.h"
-#include "clients/hamel/print.h"
 #include "clients/hamel/recorder.h"
 #include "clients/hamel/run_folder.h"
+#include "clients/hamel/run_parts.h"
 #include "clients/hamel/supervisor.h"
 #include "common/runtime/log.h"
 
@@ -95,13 +92,9 @@ int up(const RunArgs& asked) {
   RunArgs args = asked;
   runtime::StopSignal stop;
   runtime::start_log("hamel", args.run.verbose);
-  const auto scene = load_chosen(args.run);
+  const auto scene = scene_to_run(args);
   if (!scene) return runtime::complain("hamel up", scene.error());
   const scene::Scene& s = scene.value();
-  for (const auto& w : scene::warnings(s)) spdlog::warn("{}: {}", args.run.scene_path, w);
-  for (const auto& [option, path] : {std::pair{"--csv", args.csv_path}, {"--record", args.record_path}})
-    if (const auto p = output_problem(option, path, {args.run.scene_path}))
-      return runtime::complain("hamel up", {*p});
   auto node = runtime::open_node(args.run.bus, s.bus.dynamics, "hamel-up");
   if (!node) return runtime::complain("hamel up", {node.error()});
   bus::Node& n = *node.value();
@@ -116,12 +109,8 @@ int up(const RunArgs& asked) {
           fmt::format("runs already on domain {} (t = {:.3f} s): another --domain, or --set arm={}",
                       args.run.bus.domain, there->t_s, s.arm + 1)}});
 
-  std::unique_ptr<CsvWriter> csv;
-  if (!args.csv_path.empty()) {
-    auto w = CsvWriter::open(args.csv_path, s.robot.chain.n(), s.steered);
-    if (!w) return runtime::complain("hamel up", {w.error()});
-    csv = std::move(w).value();
-  }
+  auto csv = open_csv(args, s);
+  if (!csv) return runtime::complain("hamel up", {csv.error()});
   std::unique_ptr<RunFolder> folder;
   std::string state_dir = args.run.state_dir;
   if (state_dir.empty()) {
@@ -136,7 +125,7 @@ int up(const RunArgs& asked) {
 
   auto recorder = open_recorder(n, args, s, pace);
   if (!recorder) return runtime::complain("hamel up", {recorder.error()});
-  Monitor monitor(n, s, pace, std::move(csv), !args.json);
+  Monitor monitor(n, s, pace, std::move(csv).value(), !args.json);
   Supervisor supervisor;
   if (s.steered)
     for (const char* name : {"perception", "planner"})
@@ -157,13 +146,8 @@ int up(const RunArgs& asked) {
     spdlog::error("{} cannot run; ending", failed->name);
     return failed_code == runtime::kBadInput ? runtime::kBadInput : runtime::kFailed;
   }
-  if (args.json)
-    print_json(s, o);
-  else
-    print_table(s, o, scene::to_string(pace), buses(args, s));
   if (supervisor.restarts() > 0) spdlog::info("{} restarts", supervisor.restarts());
-  if (const auto p = monitor.finish_csv()) return runtime::complain("hamel up", {*p});
-  return o.exit_code;
+  return conclude("hamel up", args, s, monitor, o, pace, buses(args, s));
 }
 
 }  // namespace hamel::client

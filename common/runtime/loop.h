@@ -10,6 +10,9 @@
 namespace hamel::runtime {
 
 using Clock = std::chrono::steady_clock;
+inline Clock::duration seconds(double s) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
+}
 
 /// A service in its shell: it reads its topics, ticks, and writes its topics, on the caller's thread.
 class Service {

@@ -3,6 +3,7 @@
 #include <numbers>
 #include <set>
 
+#include "common/base/hash.h"
 #include "common/scene/locked.h"
 #include "common/scene/rules.h"
 
@@ -218,12 +219,7 @@ Problems problems(const Scene& s) {
   return all;
 }
 
-std::uint64_t fingerprint(const Scene& s) {
-  std::uint64_t h = 1469598103934665603ull;  // FNV-1a
-  for (const std::string* text : {&s.text, &s.robot.urdf})
-    for (const char c : *text + '\0') h = (h ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return h;
-}
+std::uint64_t fingerprint(const Scene& s) { return hashed(s.robot.urdf + '\0', hashed(s.text + '\0')); }
 
 std::vector<std::string> warnings(const Scene& s) {
   std::vector<std::string> out = s.robot.warnings;

@@ -15,10 +15,6 @@ namespace {
 constexpr auto kRepeat = 100ms;  // lockstep: say it again to peers that came late
 constexpr int kBurst = 64;       // steps before the other services of the process get their turn
 
-runtime::Clock::duration seconds(double s) {
-  return std::chrono::duration_cast<runtime::Clock::duration>(std::chrono::duration<double>(s));
-}
-
 /// A fresh start must not be taken for the continuation of an earlier run of this arm.
 std::uint64_t fresh_incarnation(scene::Pace pace) {
   if (pace == scene::Pace::lockstep) return 1;
@@ -183,13 +179,13 @@ bool DynamicsService::poll_realtime(Time now) {
       return true;
     }
     if (!step()) return true;
-    next_step_ += seconds(scene_.dynamics.dt_s);
+    next_step_ += runtime::seconds(scene_.dynamics.dt_s);
   }
   return true;
 }
 
 void DynamicsService::count_lateness(Time now) {
-  const auto dt = seconds(scene_.dynamics.dt_s);
+  const auto dt = runtime::seconds(scene_.dynamics.dt_s);
   if (now - next_step_ < dt) return;
   deadlines_missed_ += static_cast<std::uint64_t>((now - next_step_) / dt);
   // Up to 8 periods are caught up; more than that is given up, not run in a burst.

@@ -132,9 +132,7 @@ runtime::Clock::time_point PerceptionService::due() const {
       runtime::Clock::now() - clock_heard_ > topics::kClock.stale)
     return last_status_ + 500ms;
   const double wait_s = static_cast<double>(*next_) * source_.period_s() - clock_->t_s;
-  const auto next = clock_heard_ + std::chrono::duration_cast<runtime::Clock::duration>(
-                                       std::chrono::duration<double>(wait_s));
-  return std::min(next, last_status_ + 500ms);
+  return std::min(clock_heard_ + runtime::seconds(wait_s), last_status_ + 500ms);
 }
 
 void PerceptionService::publish_status(Time now, wire::ServiceState state) {

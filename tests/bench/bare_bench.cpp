@@ -19,6 +19,7 @@ namespace {
 using namespace hamel;
 using namespace hamel::client::ping;
 using bench::BareEnd;
+using client::quantile;
 
 constexpr std::uint32_t kDomain = 97;
 constexpr double kMost = 1.2;

@@ -8,15 +8,12 @@
 
 using namespace hamel;
 using runtime::Clock;
+using test::four_link;
 using test::made;
 using test::node;
 using namespace std::chrono_literals;
 
 namespace {
-
-scene::Scene load(const std::vector<std::string>& overrides = {}) {
-  return test::shipped("four_link_avoid", overrides);
-}
 
 /// A planner of the test's own: one writer of commands.
 struct Commander {
@@ -47,7 +44,7 @@ class Planners : public testing::Test {
   }
   Clock::time_point now = Clock::now();
   std::unique_ptr<bus::Node> n = node(21);
-  scene::Scene s = load();
+  scene::Scene s = four_link();
   std::unique_ptr<dynamics::DynamicsService> arm = made(dynamics::DynamicsService::make(*n, s, {}));
   Commander a{*n}, b{*n};
 };
@@ -80,7 +77,7 @@ class RealTime : public testing::Test {
   }
   Clock::time_point now = Clock::now();
   std::unique_ptr<bus::Node> n = node(22);
-  scene::Scene s = load({"gravity_mps2=[0, 0, 0]"});
+  scene::Scene s = four_link({"gravity_mps2=[0, 0, 0]"});
   wire::Subscription<wire::ArmState> states{*n};
   wire::ArmState last;
   std::unique_ptr<dynamics::DynamicsService> arm =
@@ -140,7 +137,8 @@ TEST_F(RealTime, AfterASilenceTheCommandComesInOverTheRampWithoutAJump) {
 TEST(Silence, TheSceneSaysWhetherTheArmHoldsOrOnlyBrakes) {
   for (const char* safe : {"hold", "brake"}) {
     const auto n = node(23);
-    const scene::Scene s = load({"gravity_mps2=[0, -9.81, 0]", std::string("dynamics.on_silence=") + safe});
+    const scene::Scene s =
+        four_link({"gravity_mps2=[0, -9.81, 0]", std::string("dynamics.on_silence=") + safe});
     auto arm = made(dynamics::DynamicsService::make(*n, s, {.pace = scene::Pace::realtime}));
     wire::Subscription<wire::ArmState> states(*n);
     Commander a(*n);

@@ -11,20 +11,17 @@
 
 using namespace hamel;
 using runtime::Clock;
+using test::four_link;
 using test::made;
 using test::node;
 using namespace std::chrono_literals;
 
 namespace {
 
-scene::Scene load(const std::vector<std::string>& overrides = {}) {
-  return test::shipped("four_link_avoid", overrides);
-}
-
 /// Several dynamics for one arm on one domain, polled in turn.
 TEST(Arms, OfTwoThatAreNewTheLaterEnds) {
   const auto n = node(24);
-  const scene::Scene s = load();
+  const scene::Scene s = four_link();
   auto first =
       made(dynamics::DynamicsService::make(*n, s, {.pace = scene::Pace::realtime, .incarnation = 5}));
   auto second =
@@ -41,7 +38,7 @@ TEST(Arms, OfTwoThatAreNewTheLaterEnds) {
 
 TEST(Arms, OneThatHasRunForLongStaysWhateverItsIncarnation) {
   const auto n = node(25);
-  const scene::Scene s = load();
+  const scene::Scene s = four_link();
   auto first =
       made(dynamics::DynamicsService::make(*n, s, {.pace = scene::Pace::realtime, .incarnation = 9}));
   auto now = Clock::now();
@@ -66,7 +63,7 @@ TEST(Arms, OneThatHasRunForLongStaysWhateverItsIncarnation) {
 
 TEST(Arms, InLockstepToTheSecondOfTwoEqualOnesEnds) {
   const auto n = node(26);
-  const scene::Scene s = load();
+  const scene::Scene s = four_link();
   auto a = made(dynamics::DynamicsService::make(*n, s, {}));
   auto b = made(dynamics::DynamicsService::make(*n, s, {}));
   auto now = Clock::now();
@@ -108,7 +105,7 @@ class OnePlanner : public testing::Test {
   wire::Subscription<wire::TorqueCommand> commands{*n};
   wire::Publisher<wire::ArmState> arm{*n}, other{*n};
   wire::Publisher<wire::ObstacleSet> sets{*n};
-  std::unique_ptr<planner::PlannerService> planner = made(planner::PlannerService::make(*n, load(), {}));
+  std::unique_ptr<planner::PlannerService> planner = made(planner::PlannerService::make(*n, four_link(), {}));
 };
 
 TEST_F(OnePlanner, HearsNoOtherArmOfItsKeyWhileItsOwnSpeaks) {
@@ -183,7 +180,8 @@ TEST(Presence, NamesAPeerOfAnotherIdlAndASecondOfItsName) {
 TEST(TwoArms, AGoalForOneDoesNotMoveTheOther) {
   const auto run = [](bool with_second) {
     const auto n = node(31);
-    const scene::Scene one = load({"planner.method=gyro"}), two = load({"arm=2", "planner.method=gyro"});
+    const scene::Scene one = four_link({"planner.method=gyro"}),
+                       two = four_link({"arm=2", "planner.method=gyro"});
     std::vector<std::unique_ptr<runtime::Service>> services;
     auto arm = made(dynamics::DynamicsService::make(*n, one, {}));
     auto& first = *arm;

@@ -15,11 +15,7 @@ namespace hamel::files {
 namespace {
 
 std::vector<std::string> files_in(const std::string& sub, const std::string& extension) {
-  std::vector<std::string> out;
-  for (const auto& entry : std::filesystem::directory_iterator(test::data_folder() / sub))
-    if (entry.path().extension() == extension) out.push_back(entry.path().string());
-  std::sort(out.begin(), out.end());
-  return out;
+  return test::files_in(test::data_folder() / sub, extension);
 }
 
 TEST(RobotsOfTheWorld, AllLoad) {

@@ -15,20 +15,17 @@
 
 using namespace hamel;
 using runtime::Clock;
+using test::four_link;
 using test::made;
 using test::node;
 using namespace std::chrono_literals;
 
 namespace {
 
-scene::Scene load(const std::vector<std::string>& overrides = {}) {
-  return test::shipped("four_link_avoid", overrides);
-}
-
 /// Runs a scene in lockstep to `until`, all services new, with checkpoints in `folder`.
 wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain) {
   const auto n = node(domain);
-  scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
+  scene::Scene s = four_link({"planner.method=gyro"});
   s.duration_s = until_s;
   wire::Subscription<wire::RunSummary> summaries(*n);
   auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder});
@@ -64,7 +61,7 @@ TEST(Restart, InLockstepContinuesBitForBit) {
 TEST(Restart, AnArmThatComesBackSaysItsLastStateAgain) {
   const test::Folder folder;
   const auto n = node(13);
-  const scene::Scene s = test::shipped("four_link_avoid", {"duration_s=0.02"});
+  const scene::Scene s = four_link({"duration_s=0.02"});
   wire::Subscription<wire::ArmState> states(*n);
   wire::Publisher<wire::TorqueCommand> commands(*n);
   wire::ArmState said, again;
@@ -96,9 +93,8 @@ TEST(Restart, AnArmThatComesBackSaysItsLastStateAgain) {
 wire::RunSummary run_with_escapes(bool killed, std::uint32_t domain) {
   const test::Folder folder;
   const auto n = node(domain);
-  scene::Scene s =
-      test::shipped("four_link_avoid", {"dynamics.dt_s=0.002", "duration_s=12", "planner.method=gyro",
-                                        "planner.kobs=0", "planner.kc=0", "planner.vmax_mps=1"});
+  scene::Scene s = four_link({"dynamics.dt_s=0.002", "duration_s=12", "planner.method=gyro", "planner.kobs=0",
+                              "planner.kc=0", "planner.vmax_mps=1"});
   s.robot = test::planar_arm(4, 1.0, 0.0);
   wire::Subscription<wire::RunSummary> summaries(*n);
   wire::Subscription<wire::PlannerReport> reports(*n);
@@ -140,7 +136,7 @@ TEST(Restart, AQuestionOutlivesThePlannerThatAskedIt) {
 wire::TorqueCommand answer(const std::string& folder, std::uint64_t first, std::uint64_t last,
                            std::uint32_t domain) {
   const auto n = node(domain);
-  const scene::Scene s = test::shipped("four_link_avoid", {"planner.method=gyro"});
+  const scene::Scene s = four_link({"planner.method=gyro"});
   wire::Publisher<wire::ArmState> states(*n);
   wire::Publisher<wire::ObstacleSet> sets(*n);
   wire::Subscription<wire::TorqueCommand> commands(*n);
@@ -204,13 +200,13 @@ class Checkpoints : public testing::Test {
 };
 
 TEST_F(Checkpoints, OfAnotherSceneAreRefusedByThePlanner) {
-  EXPECT_EQ(epoch_of(load()), 1u);
-  EXPECT_EQ(epoch_of(load()), 2u) << "resumed: the next epoch";
-  EXPECT_EQ(epoch_of(load({"planner.kp=26"})), 1u) << "another scene: afresh";
+  EXPECT_EQ(epoch_of(four_link()), 1u);
+  EXPECT_EQ(epoch_of(four_link()), 2u) << "resumed: the next epoch";
+  EXPECT_EQ(epoch_of(four_link({"planner.kp=26"})), 1u) << "another scene: afresh";
 }
 
 TEST_F(Checkpoints, OfTheDynamicsKeepThePlaceThatIsHeld) {
-  const scene::Scene s = load({"gravity_mps2=[0, -9.81, 0]"});
+  const scene::Scene s = four_link({"gravity_mps2=[0, -9.81, 0]"});
   Eigen::VectorXd whole, resumed;
   for (const bool restart : {false, true}) {
     std::filesystem::remove(folder.path() + "/dynamics-1.checkpoint");

@@ -46,7 +46,7 @@ class RelayedPlanner {
 
 wire::RunSummary run_relayed(std::uint64_t flip_at) {
   const auto n = node(1);
-  const scene::Scene s = test::shipped("four_link_avoid", {"duration_s=0.2"});
+  const scene::Scene s = test::four_link({"duration_s=0.2"});
   wire::Subscription<wire::RunSummary> summaries(*n);
   RelayedPlanner planner(*n, flip_at);
   auto arm = dynamics::DynamicsService::make(*n, s, {});
@@ -76,7 +76,7 @@ TEST(Lockstep, OneFlippedBitOfOneCommandChangesTheTrajectoryHash) {
 
 TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
   const auto n = node(2);
-  const scene::Scene s = test::shipped("four_link_avoid");
+  const scene::Scene s = test::four_link();
   auto arm = dynamics::DynamicsService::make(*n, s, {.patience = 50ms});
   ASSERT_TRUE(arm);
   const auto deadline = Clock::now() + 30s;
@@ -89,7 +89,7 @@ TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
 
 TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
   const auto n = node(3);
-  const scene::Scene s = test::shipped("four_link_avoid");
+  const scene::Scene s = test::four_link();
   wire::Publisher<wire::TorqueCommand> commands(*n);
   auto arm = dynamics::DynamicsService::make(*n, s, {});
   ASSERT_TRUE(arm);

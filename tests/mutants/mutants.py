@@ -86,6 +86,6 @@ MUTANTS = [
            "item.inflation_m + dmin - slack", "item.inflation_m + dmin - slack + 1", "planner_states_test", "*HasRoom*"),
     Mutant("goal_in_a_wall", "a goal inside what stands is refused at once", PLAN + "pursuit.cpp",
            "item.inflation_m + dmin - slack", "item.inflation_m + dmin - slack - 1", "planner_states_test", "*InsideWhatStands*"),
-    Mutant("target_behind", "a moving target is followed", PLAN + "attraction.cpp", "goal.X_WG.p + age_s *", "goal.X_WG.p - age_s *",
+    Mutant("target_behind", "a moving target is followed", "common/lie/se3.h", "X.p += t_s *", "X.p -= t_s *",
            "planner_goals_test", "*Followed*"),
 ]

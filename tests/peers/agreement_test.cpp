@@ -88,10 +88,9 @@ TEST_P(Peers, AgreeOnTheExamplesOfThePaper) {
 
 TEST_P(Peers, AgreeOnRobotsOfTheWorld) {
   HAMEL_NEEDS_DATA("urdf");
-  for (const auto& entry : std::filesystem::directory_iterator(test::data_folder() / "urdf")) {
-    if (entry.path().extension() != ".urdf") continue;
-    SCOPED_TRACE(entry.path().filename().string());
-    const auto robot = files::load_urdf(entry.path().string());
+  for (const std::string& file : test::files_in(test::data_folder() / "urdf", ".urdf")) {
+    SCOPED_TRACE(file);
+    const auto robot = files::load_urdf(file);
     ASSERT_TRUE(robot) << to_string(robot.error().front());
     compare_at(robot.value().chain.spec(), 7, 20);
   }

@@ -42,14 +42,13 @@ std::string without_shapes(const std::filesystem::path& path) {
 
 TEST(MujocoReadsTheSameRobot, FromTheFile) {
   HAMEL_NEEDS_DATA("urdf");
-  for (const auto& entry : std::filesystem::directory_iterator(test::data_folder() / "urdf")) {
-    if (entry.path().extension() != ".urdf") continue;
-    SCOPED_TRACE(entry.path().filename().string());
-    const auto robot = files::load_urdf(entry.path().string());
+  for (const std::string& file : test::files_in(test::data_folder() / "urdf", ".urdf")) {
+    SCOPED_TRACE(file);
+    const auto robot = files::load_urdf(file);
     ASSERT_TRUE(robot) << to_string(robot.error().front());
     model::ChainSpec spec = robot.value().chain.spec();
     const int n = static_cast<int>(spec.joints.size());
-    MujocoModel theirs({{"robot.urdf", without_shapes(entry.path())}});
+    MujocoModel theirs({{"robot.urdf", without_shapes(file)}});
     theirs.disable_constraints();
     ASSERT_EQ(theirs.joints(), n);
     const model::Chain chain = test::checked(spec);

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace hamel::test {
 
@@ -17,6 +19,15 @@ inline std::filesystem::path data_folder() {
        up.has_relative_path(); up = up.parent_path())
     if (std::filesystem::is_directory(up / "shared/data", error)) return up / "shared/data";
   return {};
+}
+
+/// Paths of the files in a folder with this extension, in order.
+inline std::vector<std::string> files_in(const std::filesystem::path& folder, const std::string& extension) {
+  std::vector<std::string> out;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().extension() == extension) out.push_back(entry.path().string());
+  std::sort(out.begin(), out.end());
+  return out;
 }
 
 }  // namespace hamel::test

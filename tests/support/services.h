@@ -29,6 +29,11 @@ inline scene::Scene shipped(const std::string& name, const std::vector<std::stri
   return std::move(s).value();
 }
 
+/// Example 5.2 as shipped.
+inline scene::Scene four_link(const std::vector<std::string>& overrides = {}) {
+  return shipped("four_link_avoid", overrides);
+}
+
 /// What an arm at rest at `q` says of itself after `step` steps of 1 ms.
 inline wire::ArmState arm_state(std::uint64_t step, const Eigen::VectorXd& q, std::uint32_t arm = 1,
                                 std::uint64_t incarnation = 1) {
