@@ -136,6 +136,8 @@ class CsvRows {
 };
 
 Checked<Course> course_of_csv(const CourseOptions& o) {
+  if (o.scene_path.empty() && !o.overrides.empty())
+    return Problems{{"--set " + o.overrides.front(), "changes a scene: name it with --scene"}};
   Course c;
   c.name = o.path;
   if (!o.scene_path.empty()) {

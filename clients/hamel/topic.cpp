@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "clients/hamel/timing.h"
 #include "common/runtime/loop.h"
@@ -237,8 +238,13 @@ int topic_latency(const TopicArgs& args) {
   wire::Subscription<wire::ArmState> states(n);
   wire::Subscription<wire::TorqueCommand> commands(n);
   std::unordered_map<std::uint64_t, Clock::time_point> seen;
+  std::unordered_set<std::uint64_t> early;  // commands that overtook their states on the way here
   std::vector<double> ms;
   std::uint64_t unanswered = 0;  // from the first answer on: before it the two ends had not met
+  const auto answer = [&](std::uint64_t step, double after_ms) {
+    if (ms.empty()) std::erase_if(seen, [step](const auto& state) { return state.first < step; });
+    ms.push_back(after_ms);
+  };
   wire::ArmState s;
   wire::TorqueCommand c;
   const std::uint32_t arm = args.arm.value_or(1);
@@ -247,14 +253,22 @@ int topic_latency(const TopicArgs& args) {
     while (states.take(s)) {
       if (s.arm != arm) continue;
       if (seen.size() > 4096) unanswered += ms.empty() ? 0 : seen.size(), seen.clear();
-      seen.try_emplace(s.step, Clock::now());
+      if (early.erase(s.step) > 0)
+        answer(s.step, 0);
+      else
+        seen.try_emplace(s.step, Clock::now());
     }
     while (commands.take(c)) {
-      const auto asked = c.arm == arm ? seen.find(c.step) : seen.end();
-      if (asked == seen.end()) continue;
-      if (ms.empty()) std::erase_if(seen, [&](const auto& state) { return state.first < c.step; });
-      ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - asked->second).count());
+      if (c.arm != arm) continue;
+      const auto asked = seen.find(c.step);
+      if (asked == seen.end()) {
+        if (early.size() > 4096) early.clear();
+        early.insert(c.step);
+        continue;
+      }
+      const double after_ms = std::chrono::duration<double, std::milli>(Clock::now() - asked->second).count();
       seen.erase(asked);
+      answer(c.step, after_ms);
     }
     n.wait(deadline);
   }

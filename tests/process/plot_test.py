@@ -47,6 +47,8 @@ class Plot(Files):
         code, _, err = hamel("plot", table, "-o", self.folder / "x.svg", "--scene", scene("panda_reach"))
         self.assertEqual(code, 2)
         self.assertIn("has 4 joints", err)
+        code, _, err = hamel("plot", table, "-o", self.folder / "x.svg", "--set", "planner.rho0_m=abc")
+        self.assertEqual((code, err), (2, "hamel plot: --set planner.rho0_m=abc: changes a scene: name it with --scene\n"))
 
     def test_a_csv_with_a_word_for_a_number_is_refused(self):
         table = self.folder / "run.csv"
@@ -63,8 +65,10 @@ class Plot(Files):
 
     def test_labels_of_the_axes_do_not_meet(self):
         """Both axes of the path have one scale, and one of them may be short."""
-        file, _ = self.recorded("panda_reach", *SHORT)
-        picture = ElementTree.fromstring(self.drawn(file, "--kind", "path"))
+        table = self.folder / "run.csv"
+        code, _, err = hamel("run", scene("panda_reach"), "--csv", table)
+        self.assertEqual(code, 0, err)
+        picture = ElementTree.fromstring(self.drawn(table, "--kind", "path"))
         below = {}
         for g in picture.iter("{http://www.w3.org/2000/svg}g"):
             at = re.match(r"translate\(([-\d.]+),([-\d.]+)\)", g.get("transform", ""))
