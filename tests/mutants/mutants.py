@@ -83,9 +83,9 @@ MUTANTS = [
     Mutant("tank_without_braking", "the pull's braking pays for circulation", PLAN + "steering.cpp", "+ pull_share * std::max(",
            "+ 0 * std::max(", "planner_example_5_2_test", "*StartsAgain*"),
     Mutant("goal_beside_a_wall", "a goal with room beside an obstacle is tried", PLAN + "pursuit.cpp",
-           "item.inflation_m + dmin - slack", "item.inflation_m + dmin - slack + 1", "planner_states_test", "*HasRoom*"),
+           "attraction.target(), turns, margin_m - slack", "attraction.target(), turns, margin_m - slack + 1", "planner_states_test", "*HasRoom*"),
     Mutant("goal_in_a_wall", "a goal inside what stands is refused at once", PLAN + "pursuit.cpp",
-           "item.inflation_m + dmin - slack", "item.inflation_m + dmin - slack - 1", "planner_states_test", "*InsideWhatStands*"),
+           "attraction.target(), turns, margin_m - slack", "attraction.target(), turns, margin_m - slack - 1", "planner_states_test", "*InsideWhatStands*"),
     Mutant("target_behind", "a moving target is followed", "common/lie/se3.h", "X.p += t_s *", "X.p -= t_s *",
            "planner_goals_test", "*Followed*"),
 ]

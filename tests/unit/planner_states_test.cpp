@@ -211,6 +211,23 @@ TEST(States, AGoalThatHasRoomBesideWhatStandsIsTried) {
   expect(b.plan(), State::moving, Reason::none);
 }
 
+// At a joint goal any link may be in the way, not the last alone.
+TEST(States, AJointGoalInWhichALinkStandsInSomethingIsSaidAtOnce) {
+  Bench b;
+  b.goal.kind = scene::GoalKind::joints;
+  b.goal.joints = Eigen::Vector4d(-0.5, 0.5, -0.5, 1);
+  const Eigen::Vector3d along(std::cos(-0.5), std::sin(-0.5), 0);
+  b.obstacles = {sphere(1, 0.7 * along, 0.1)};  // the first link, 5 cm thick
+  const Output out = b.plan();
+  expect(out, State::stuck, Reason::goal_blocked);
+  EXPECT_TRUE(out.torque_Nm.isZero());
+  b.obstacles = {sphere(1, 0.7 * along + Eigen::Vector3d(0, 0, 0.2), 0.1)};
+  expect(b.plan(), State::moving, Reason::none);
+  b.obstacles[0].X_WO.p = 0.7 * along;
+  b.obstacles[0].V_WO[5] = 0.01;
+  expect(b.plan(), State::moving, Reason::none);
+}
+
 // A base that reaches farther than the arm does.
 TEST(States, WhatRunsIntoTheBaseIsToldWhereverItIs) {
   Bench b;

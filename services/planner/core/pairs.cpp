@@ -14,6 +14,11 @@ namespace {
 
 using Eigen::Vector3d;
 
+bool leaves_less(const Obstacles::Item& item, const geometry::Solid& solid_W, double margin_m) noexcept {
+  return geometry::distance_bound(solid_W, item.solid) < margin_m &&
+         geometry::closest(solid_W, item.solid).distance_m < margin_m;
+}
+
 constexpr double kOwnWay_m = 0.05;  // what list_near_links() found is good for so far a way of the links
 
 }  // namespace
@@ -227,12 +232,29 @@ void Pairs::measure(const Arm& arm, Body& body, const Obstacles& obstacles) noex
 
 bool Pairs::blocks(const Obstacles::Item& item, const lie::Pose& X_WE, bool turns,
                    double margin_m) const noexcept {
-  const auto near = [&](const geometry::Solid& solid_W) {
-    return geometry::distance_bound(solid_W, item.solid) < margin_m &&
-           geometry::closest(solid_W, item.solid).distance_m < margin_m;
-  };
-  if (turns) return near(geometry::solid({geometry::ShapeKind::sphere, {tip_radius_m_, 0, 0}}, X_WE));
-  return std::any_of(tip_E_.begin(), tip_E_.end(), [&](const auto& s_E) { return near(X_WE * s_E); });
+  if (turns)
+    return leaves_less(item, geometry::solid({geometry::ShapeKind::sphere, {tip_radius_m_, 0, 0}}, X_WE),
+                       margin_m);
+  return std::any_of(tip_E_.begin(), tip_E_.end(),
+                     [&](const auto& s_E) { return leaves_less(item, X_WE * s_E, margin_m); });
+}
+
+void Pairs::set_goal(const model::Chain& chain, const Eigen::VectorXd& q) {
+  rbd::Workspace ws(chain);
+  rbd::positions(chain, q, ws);
+  at_goal_.clear();
+  for (const Body& b : bodies_) {
+    if (b.link < 0) continue;
+    const double turns_m = levers_m_.col(b.link).head(b.link + 1).sum();
+    at_goal_.push_back(
+        {ws.X_WB[static_cast<std::size_t>(b.link)] * b.solid_B, options_.goal_tolerance_joint * turns_m});
+  }
+}
+
+bool Pairs::blocks_goal(const Obstacles::Item& item, double margin_m, bool anywhere) const noexcept {
+  return std::any_of(at_goal_.begin(), at_goal_.end(), [&](const AtGoal& b) {
+    return leaves_less(item, b.solid_W, anywhere ? margin_m - b.slack_m : margin_m);
+  });
 }
 
 // When the table is full the farthest pair makes room.

@@ -84,6 +84,12 @@ class Pairs {
   /// however the link is turned there (then true only where the ball about the end effector inside it is too
   /// near).
   bool blocks(const Obstacles::Item& item, const lie::Pose& X_WE, bool turns, double margin_m) const noexcept;
+  /// Takes a joint goal for blocks_goal().  Allocates.
+  /// @param q  n values, finite
+  void set_goal(const model::Chain& chain, const Eigen::VectorXd& q);
+  /// The obstacle leaves less than `margin_m` to a link at the joint goal, and with `anywhere` wherever else
+  /// each joint is within options.goal_tolerance_joint of it.
+  bool blocks_goal(const Obstacles::Item& item, double margin_m, bool anywhere) const noexcept;
 
  private:
   struct Body {
@@ -102,6 +108,11 @@ class Pairs {
     double spare_m = 0;  ///< from range, at least; negative: in range
     double age_s = 0;
     Nearest nearest;
+  };
+  /// A body at the joint goal, and how far the goal's tolerance takes it.
+  struct AtGoal {
+    geometry::Solid solid_W;
+    double slack_m = 0;
   };
   const geometry::Solid& place(const Arm& arm, Body& body) noexcept;
   void touch_base(const Arm& arm, Body& base, const Obstacles& obstacles) noexcept;
@@ -130,6 +141,7 @@ class Pairs {
   Eigen::Index n_ = 0;
   Eigen::MatrixXd J_, MJ_, J_other_;    ///< all Jacobians side by side; M^-1 J^T of one; the other link's
   std::vector<geometry::Solid> tip_E_;  ///< shapes of the last link, seen from the end effector
+  std::vector<AtGoal> at_goal_;
   double clearance_m_ = 0, self_clearance_m_ = 0, tip_radius_m_ = 0;
   bool base_touched_ = false;
   int dropped_ = 0, shapes_ = 0;  ///< shapes_: bodies that are not the base's

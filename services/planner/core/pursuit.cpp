@@ -25,6 +25,7 @@ void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
   const bool same = wanted.id == memory.goal_id && wanted.kind == sought.kind &&
                     wanted.X_WG.p == sought.X_WG.p && wanted.X_WG.R == sought.X_WG.R;
   if (!goal_fits || wanted.kind == scene::GoalKind::joints) {
+    if (goal_fits) pairs.set_goal(arm.chain, wanted.joints);
     goal_reachable = true;
     beyond_W.setZero();
   } else if (!same || !looked) {
@@ -58,7 +59,7 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
         joints ? attraction.beyond_limits(arm, goal)
                : (!goal_reachable && !approaching()) ||
                      (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
-    now.target_blocked = target_is_blocked = !joints && target_blocked(false);
+    now.target_blocked = target_is_blocked = target_blocked(false);
     const bool rejects = options.method == Method::gyro && options.unreachable == scene::Unreachable::reject;
     refused =
         now.target_blocked && rejects && !now.out_of_reach && goal.V_WG.isZero(0) && target_blocked(true);
@@ -135,16 +136,18 @@ double Planner::Impl::slow_down(const Input& in) const noexcept {
   return span > 0 ? std::clamp(1 - (age - options.stale_slow_s) / span, 0.0, 1.0) : 1.0;
 }
 
-// An obstacle has no room beside it for the last link at the target; for good: it stands, and no place within
-// the tolerance has room either.
+// An obstacle has no room beside it for the last link at the target, or for any link at a joint goal; for
+// good: it stands, and no place within the tolerance has room either.
 bool Planner::Impl::target_blocked(bool for_good) const noexcept {
-  const bool turns = goal.kind != scene::GoalKind::pose;
+  const bool joints = goal.kind == scene::GoalKind::joints, turns = goal.kind != scene::GoalKind::pose;
   const double dmin = options.barrier_gain > 0 ? options.dmin_m : 0;
   const double slack = for_good ? options.goal_tolerance_m : 0;
   const auto items = obstacles.items();
   return std::any_of(items.begin(), items.end(), [&](const Obstacles::Item& item) {
     if (for_good && !(item.now.velocity_known && item.now.V_WO.isZero(0))) return false;
-    return pairs.blocks(item, attraction.target(), turns, item.inflation_m + dmin - slack);
+    const double margin_m = item.inflation_m + dmin;
+    if (joints) return pairs.blocks_goal(item, margin_m, for_good);
+    return pairs.blocks(item, attraction.target(), turns, margin_m - slack);
   });
 }
 
