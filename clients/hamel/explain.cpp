@@ -49,6 +49,7 @@ void print_reductions(const Explained& e) {
                found > r.bound * (1 + 1e-9) ? ": THE BOUND DOES NOT HOLD HERE" : "");
   }
   fmt::print("* in force.  Fidelity {}.\n", scene::to_string(e.reduced.reduce.fidelity));
+  for (const std::string& refused : scene::refused(e.reduced)) fmt::print("Asked for, but {}\n", refused);
 }
 
 void print_costs(const Explained& e) {
@@ -118,6 +119,7 @@ Json json_of(const Explained& e) {
       j["bounds"].push_back(
           {{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}, {"measured", measured(e, r.name)}});
   }
+  j["asked_for_but"] = scene::refused(s);
   j["cost_per_step"] = {{"full", json_of(e.full_cost)}, {"reduced", json_of(e.reduced_cost)}};
   for (const ReductionCost& r : e.each) j["cost_per_step"]["without " + r.name] = json_of(r.without);
   j["measured_error"] =

@@ -314,5 +314,34 @@ TEST(Reductions, AreForbiddenAndForced) {
   EXPECT_EQ(forbidden.reductions.size(), once) << "twice changes nothing more";
 }
 
+TEST(Asked, ForWhatCannotBeDoneIsSaid) {
+  test::Random rng(5);
+  Scene s = test::random_scene(rng, false, 0);
+  s.perception.obstacles.clear();
+  s.robot.self_pairs.clear();
+  s.robot.shapes.clear();
+  s.planner.vmax_mps = kInf;
+  for (const NamedChoice& c : choices()) s.reduce.*c.choice = Choice::on;
+  const auto said = [](const Scene& of, const std::string& name) {
+    for (const std::string& line : refused(of))
+      if (line.starts_with(name + ": ")) return line.size() > name.size() + 5;
+    return false;
+  };
+  Scene reduced = s;
+  EXPECT_TRUE(refused(reduced).empty()) << "not reduced yet";
+  reduce(reduced);
+  for (const char* name : {"locked", "plane", "self", "links", "shapes", "merge", "cycle", "step"})
+    EXPECT_TRUE(said(reduced, name)) << name;
+  for (const char* name : {"obstacles", "requery"}) EXPECT_FALSE(said(reduced, name)) << name;
+  for (const NamedChoice& c : choices()) s.reduce.*c.choice = Choice::off;
+  reduced = s;
+  reduce(reduced);
+  EXPECT_TRUE(refused(reduced).empty()) << "nothing was asked for";
+  s.steered = false;
+  s.reduce.merge = Choice::on;
+  reduce(s);
+  EXPECT_EQ(refused(s), std::vector<std::string>{"merge: the scene is not steered"});
+}
+
 }  // namespace
 }  // namespace hamel::scene
