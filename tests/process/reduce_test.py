@@ -73,6 +73,18 @@ class Fastest(unittest.TestCase):
         _, seldom = outcome("run", scene("panda_reach"), "--duration", "0.2", "--set", "reduce.requery=on")
         self.assertEqual(plain["trajectory_hash"], seldom["trajectory_hash"])
 
+    def test_cycles_that_hurry_are_the_same_in_one_loop_and_over_a_bus(self):
+        fast = ["--set", "qd0=[0.5, 0, 0, 0]", "--set", "planner.vmax_mps=0.5", "--set", "duration_s=0.5"]
+        seldom = ["--set", "accuracy.obstacle_error_m=0.01", "--set", "reduce.cycle=on"]
+        _, o = outcome("run", scene("four_link_avoid"), *fast, *seldom)
+        _, fixed = outcome("run", scene("four_link_avoid"), *fast, "--set", "planner.period_steps=10")
+        self.assertNotEqual(o["trajectory_hash"], fixed["trajectory_hash"])
+        with tempfile.TemporaryDirectory() as folder:
+            table, out = pathlib.Path(folder, "one.csv"), pathlib.Path(folder, "out.csv")
+            table.write_text("planner.kobs\n4\n")
+            self.assertEqual(hamel("batch", table, "--scene", scene("four_link_avoid"), "-o", out, *fast, *seldom)[0], 0)
+            self.assertIn(o["trajectory_hash"], out.read_text())
+
     def test_what_is_asked_for_and_cannot_be_done_is_said(self):
         asked = ("--set", "reduce.locked=on", "--set", "reduce.plane=on", "--set", "reduce.obstacles=on")
         _, o = outcome("run", scene("panda_reach"), "--duration", "0.1", *asked)
