@@ -81,7 +81,7 @@ scene::Scene scene_to_bound(test::Random& rng, bool planar) {
   const Eigen::Vector3d along = out.cross(rng.unit()).normalized();
   const Eigen::Matrix3d R =
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), along).toRotationMatrix();
-  const double radius = rng.uniform(0.03, 0.1), thicker = radius + rng.uniform(0.5, 0.9) * most;
+  const double radius = rng.uniform(0.03, 0.1), thicker = radius + rng.uniform(0.5, 1.3) * most;
   const auto pole = [&](std::uint32_t id, double r, double from, double to) {
     scene::ScriptedObstacle o;
     o.at_start.id = id;

@@ -130,9 +130,10 @@ TEST(ExactReductions, WatchWhatIsLockedOntoTheBase) {
     s.perception.obstacles.clear();
     rbd::Workspace ws(s.robot.chain);
     rbd::positions(s.robot.chain, s.q0, ws);
-    for (std::uint32_t id = 1; id <= 4; ++id) {
+    const std::uint32_t count = k % 2 == 0 ? 4 : 30;  // many are sifted about the arm
+    for (std::uint32_t id = 1; id <= count; ++id) {
       scene::ScriptedObstacle o;
-      o.at_start = test::sphere(id, ws.X_WB[0].p + rng.uniform(0.1, 0.8) * rng.unit(), 0.05);
+      o.at_start = test::sphere(id, ws.X_WB[0].p + rng.uniform(0.1, 0.2 * count) * rng.unit(), 0.05);
       s.perception.obstacles.push_back(o);
     }
     const auto first = [](const scene::Scene& of) {
