@@ -86,11 +86,17 @@ std::string row(const Variations& v, std::size_t i, const VariationResult& r) {
   return out + "," + to_csv(r);
 }
 
-/// Names the job: another scene, robot, table or program begins anew.
+/// Names the job: another scene, robot, stream, table or program begins anew.
 std::string job_name(const scene::Scene& s, const Variations& v) {
   std::uint64_t h = scene::fingerprint(s);
+  const auto add = [&h](const std::string& text) { h = hashed(text + '\n', h); };
+  add(s.robot.spheres);
+  if (s.perception.stream)
+    for (const scene::StreamSample& x : s.perception.stream->samples)
+      add(fmt::format("{} {} {} {} {} {} {} {}", x.t_s, x.id, x.p_m.x(), x.p_m.y(), x.p_m.z(),
+                      x.shape.dims_m.x(), x.shape.dims_m.y(), x.shape.dims_m.z()));
   for (std::size_t i = 0; i < v.size(); ++i)
-    for (const std::string& x : v.overrides(i)) h = hashed(x + '\n', h);
+    for (const std::string& x : v.overrides(i)) add(x);
   return fmt::format("hamel batch of {}, {} variations, {:016x}, {}", s.name, v.size(), h,
                      runtime::version());
 }
@@ -162,6 +168,9 @@ int batch(const BatchArgs& args) {
     for (const std::string& kept : journal->kept()) tally.add(kept, 1 + v.fields().size());
     begun = std::min(journal->kept().size(), v.size());
     if (begun > 0) fmt::print(stderr, "going on after {} of {}\n", begun, v.size());
+    if (journal->thrown_away() > 0)
+      fmt::print(stderr, "{} rows of {}.partial were altered or do not follow on those before: done again\n",
+                 journal->thrown_away(), args.out_path);
   }
 
   Problems problems;

@@ -174,6 +174,7 @@ scene::Scene with(const scene::Scene& s, const scene::DynamicsOptions& o, int pe
   scene::Scene out = s;
   out.dynamics = o;
   out.planner.period_steps = period_steps;
+  out.planner.hurry_steps = 0;
   return out;
 }
 
@@ -217,6 +218,11 @@ Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
 }
 
 void apply(const Choosing& c, scene::Scene& s) {
+  if (!c.chosen) {
+    for (scene::Reduction& r : s.reductions)
+      if (r.name == "step") r.why = "nothing tried keeps to the accuracy";
+    return;
+  }
   const Setting& setting = *c.chosen;
   for (scene::Reduction& r : s.reductions) {
     if (r.name == "cycle" && r.in_force) {
@@ -233,8 +239,7 @@ void apply(const Choosing& c, scene::Scene& s) {
     r.after = setting.dynamics.dt_s;
     r.bound = error_bound(setting, c.reference);
   }
-  s.dynamics = setting.dynamics;
-  s.planner.period_steps = setting.period_steps;
+  s = with(s, setting.dynamics, setting.period_steps);
 }
 
 std::vector<std::string> overrides(const Setting& s) {

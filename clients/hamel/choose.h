@@ -51,7 +51,8 @@ Choosing choose(const scene::Scene& scene, const trade::Watch& watch);
 double error_bound(const Setting& s, const Converged& reference) noexcept;
 /// True when a setting's bound keeps to what was asked.
 bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& reference) noexcept;
-/// The scene with the chosen setting, and its entry "step" in Scene::reductions.  Needs a choice.
+/// The scene with the chosen setting, and its entry "step" in Scene::reductions; without a choice the entry
+/// says so.
 void apply(const Choosing& c, scene::Scene& scene);
 /// The same as overrides: "dynamics.tier=gauss" and so on.
 std::vector<std::string> overrides(const Setting& s);

@@ -11,12 +11,15 @@ Checked<scene::Scene> load_chosen(runtime::RunOptions& o) {
   if (!scene || !scene::wanted(scene.value().reduce, scene.value().reduce.step, false)) return scene;
   const Choosing c = choose(scene.value(), steady_watch());
   if (!c.chosen) {
+    apply(c, scene.value());
     spdlog::warn("{}: nothing tried keeps every joint within {:g} over {:g} s; tier and step stay as written",
                  o.scene_path, scene.value().accuracy.joint_error_rad, c.reference.horizon_s);
     return scene;
   }
   std::string said;
-  for (const std::string& set : overrides(*c.chosen)) {
+  std::vector<std::string> sets = overrides(*c.chosen);
+  if (scene.value().reduce.cycle == scene::Choice::on) sets.push_back("reduce.cycle=off");  // it is chosen
+  for (const std::string& set : sets) {
     o.overrides.push_back(set);
     said += " --set " + set;
   }

@@ -48,6 +48,7 @@ void print_reductions(const Explained& e) {
                found > r.bound * (1 + 1e-9) ? ": THE BOUND DOES NOT HOLD HERE" : "");
   }
   fmt::print("* in force.  Fidelity {}.\n", scene::to_string(e.reduced.reduce.fidelity));
+  for (const std::string& refused : scene::refused(e.reduced)) fmt::print("Asked for, but {}\n", refused);
 }
 
 void print_costs(const Explained& e) {
@@ -120,6 +121,7 @@ Json json_of(const Explained& e) {
       j["bounds"].push_back(
           {{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}, {"measured", measured(e, r.name)}});
   }
+  j["asked_for_but"] = scene::refused(s);
   j["cost_per_step"] = {{"full", json_of(e.full_cost, s.steered)},
                         {"reduced", json_of(e.reduced_cost, s.steered)}};
   for (const ReductionCost& r : e.each)

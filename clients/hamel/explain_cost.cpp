@@ -5,7 +5,9 @@
 #include <numbers>
 
 #include "clients/hamel/ticks.h"
+#include "common/rbd/rbd.h"
 #include "common/scene/reduce.h"
+#include "services/planner/core/pairs.h"
 
 namespace hamel::client {
 
@@ -61,18 +63,10 @@ double apart(const Variant& a, const Variant& b) {
   return worst;
 }
 
+/// None for those that are always done, or by nobody; and for the step, which is measured apart.
 scene::Choice* choice(scene::ReduceOptions& o, const std::string& name) {
-  if (name == "locked") return &o.locked;
-  if (name == "plane") return &o.plane;
-  if (name == "gravity") return &o.gravity;
-  if (name == "obstacles") return &o.obstacles;
-  if (name == "links") return &o.links;
-  if (name == "self") return &o.self;
-  if (name == "shapes") return &o.shapes;
-  if (name == "merge") return &o.merge;
-  if (name == "requery") return &o.requery;
-  if (name == "rate") return &o.rate;
-  if (name == "cycle") return &o.cycle;
+  for (const scene::NamedChoice& c : scene::choices())
+    if (name == c.name && name != "step") return &(o.*c.choice);
   return nullptr;
 }
 
@@ -90,37 +84,64 @@ scene::Scene alone(const scene::Scene& written, const std::string& name, bool wi
   return s;
 }
 
+/// The longest way of a point of the arm between two configurations, at most: of a capsule the farther of its
+/// ends, and what its radius adds by turning, |R2 - R1| = |R2 - R1|_F / sqrt(2).
+double farthest_way(const scene::Robot& robot, const rbd::Workspace& from, const rbd::Workspace& to) {
+  const model::Chain& chain = robot.chain;
+  double most = (rbd::tip(chain, to).p - rbd::tip(chain, from).p).norm();
+  for (const scene::LinkShape& s : robot.shapes) {
+    if (s.link < 0) continue;
+    const auto i = static_cast<std::size_t>(s.link);
+    const lie::Pose &a = from.X_WB[i], &b = to.X_WB[i];
+    const geometry::Capsule c = s.X_LS * geometry::enclosing_capsule(s.shape);
+    const double ends = std::max((b * c.p0 - a * c.p0).norm(), (b * c.p1 - a * c.p1).norm());
+    most = std::max(most, ends + (b.R - a.R).norm() / std::numbers::sqrt2 * c.radius_m);
+  }
+  return most;
+}
+
 }  // namespace
 
 double closed_in(const scene::Scene& s, std::uint64_t steps) {
   Ticks ticks(s);
+  const model::Chain& chain = s.robot.chain;
   double obstacle_mps = 0;
   for (const scene::ScriptedObstacle& o : s.perception.obstacles)
     obstacle_mps = std::max(
         obstacle_mps, o.velocity_mps.norm() + 2 * std::numbers::pi * o.frequency_hz * o.amplitude_m.norm());
-  const auto period = static_cast<std::uint64_t>(s.planner.period_steps);
+  const auto written = static_cast<std::uint64_t>(s.planner.hurry_steps);
+  rbd::Workspace before(chain), now(chain);
+  std::uint64_t cycles = 0, last = 0;
   double most = 0;
-  Eigen::Vector3d before = Eigen::Vector3d::Zero();
   for (std::uint64_t k = 0; k < steps && !ticks.done(); ++k) {
     ticks.plan();
-    const Eigen::Vector3d now = ticks.report().end_effector_m;
-    if (k > 0 && k % period == 0) most = std::max(most, (now - before).norm());
-    if (k % period == 0) before = now;
+    if (ticks.cycles() > cycles) {
+      rbd::positions(chain, ticks.arm().state().q, now);
+      const double apart_s = static_cast<double>(k - last) * s.dynamics.dt_s;
+      if (cycles > 0 && k - last > written)
+        most = std::max(most, farthest_way(s.robot, before, now) + obstacle_mps * apart_s);
+      std::swap(before, now);
+      cycles = ticks.cycles();
+      last = k;
+    }
     if (!ticks.step()) break;
   }
-  return most + obstacle_mps * s.planner.period_steps * s.dynamics.dt_s;
+  return most;
 }
 
-double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps) {
+double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps,
+                      double near_m) {
   Ticks a(reduced), b(exact);
   double worst = 0;
   for (std::uint64_t k = 0; k < steps && !a.done(); ++k) {
     a.plan();
     b.plan(a.arm().state(), a.arm().t_s());
     const auto &x = a.report().links, &y = b.report().links;
-    for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i)
-      if (std::isfinite(y[i].distance_m))
-        worst = std::max(worst, std::abs(x[i].distance_m - y[i].distance_m));
+    for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i) {
+      const double now_m = std::clamp(x[i].distance_m, 0.0, planner::kSeen_m),
+                   true_m = std::clamp(y[i].distance_m, 0.0, planner::kSeen_m);
+      worst = std::max(worst, std::abs(now_m - true_m) / std::max(1.0, true_m / near_m));
+    }
     if (!a.step()) break;
   }
   return worst;
@@ -152,10 +173,11 @@ Explained explain_scene(const scene::Scene& written, double seconds, const trade
       out.errors.push_back({r.name, closed_in(alone(written, r.name, true), 4 * steps)});
     else if (!r.exact && r.in_force)
       out.errors.push_back(
-          {r.name, distance_error(alone(written, r.name, true), alone(written, r.name, false), 4 * steps)});
+          {r.name, distance_error(alone(written, r.name, true), alone(written, r.name, false), 4 * steps,
+                                  r.name == "merge" ? written.planner.rho0_m : scene::kInf)});
   if (scene::wanted(written.reduce, written.reduce.step, false)) {
     out.choosing = choose(out.reduced, watch);
-    if (out.choosing->chosen) apply(*out.choosing, out.reduced);
+    apply(*out.choosing, out.reduced);
   }
   return out;
 }

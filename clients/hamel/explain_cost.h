@@ -22,9 +22,10 @@ struct ReductionCost {
   StepCost without;  ///< the scene with this reduction forbidden
 };
 
-/// A bounded reduction by itself, over the first steps of the run: the largest distance of a link to its
-/// nearest obstacle that was off (shapes, merge, requery, rate), or the longest way that the end effector and
-/// an obstacle closed in between two cycles (cycle) [m].
+/// A bounded reduction by itself, over the first steps of the run: by how much the distance of a link to its
+/// nearest obstacle was off at most (shapes, requery, rate; merge: distances beyond rho0 count in
+/// proportion), or the longest way that a point of the arm and an obstacle closed in between two cycles
+/// (cycle) [m].
 struct MeasuredError {
   std::string name;
   double error_m = 0;
@@ -39,10 +40,12 @@ struct Explained {
 };
 
 /// Runs `reduced`, and beside it the planner of `exact` at the same states: by how much the distances that
-/// the links report differ at most [m].
-double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps);
-/// How far the end effector and the fastest scripted obstacle close in between two planner cycles, at most
-/// [m].
+/// the links report differ at most [m].  Of a distance d beyond `near_m` the share near_m/d counts; what
+/// touches is at distance 0, and what is farther than kSeen_m, where obstacles may be seen or not, at that.
+double distance_error(const scene::Scene& reduced, const scene::Scene& exact, std::uint64_t steps,
+                      double near_m = scene::kInf);
+/// How far any point of the arm and the fastest scripted obstacle close in at most between two planner cycles
+/// that the reduction `cycle` put farther apart than as written [m].
 double closed_in(const scene::Scene& reduced, std::uint64_t steps);
 /// Reduces `written` in every way and runs each for about `seconds` of CPU time, in turns.
 Explained explain_scene(const scene::Scene& written, double seconds, const trade::Watch& watch);

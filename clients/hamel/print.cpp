@@ -47,6 +47,7 @@ void print_json(const scene::Scene& scene, const Outcome& o) {
   j["residual_max_Nm"] = number(o.summary.residual_max_Nm);
   j["fidelity"] = scene::to_string(scene.reduce.fidelity);
   j["reductions"] = scene::names_in_force(scene);
+  j["asked_for_but"] = scene::refused(scene);
   j["steps"] = o.summary.steps;
   j["substepped"] = o.summary.substepped;
   j["commands_missed"] = o.summary.commands_missed;
@@ -83,6 +84,7 @@ void print_table(const scene::Scene& scene, const Outcome& o, const std::string&
     line("path length", si(o.path_length_m, "m"));
   }
   line("reductions", scene::names_in_force(scene));
+  for (const std::string& refused : scene::refused(scene)) line("asked for, but", refused);
   const bool lost = o.summary.energy_drift_rel > kDriftOfConcern;
   line("energy drift", fmt::format("{:.2e} of the energy scale{}", o.summary.energy_drift_rel,
                                    lost ? ": the step is too long for this motion, do not trust it" : ""));

@@ -15,6 +15,7 @@ constexpr std::uint64_t kNever = ~std::uint64_t{0};
 Ticks::Ticks(const scene::Scene& scene)
     : scene_(scene),
       arm_(scene_),
+      cadence_(scene_),
       planner_(scene_.robot, scene_.planner, planner::savings(scene_)),
       output_(planner_.output()),
       view_(scene_),
@@ -38,14 +39,13 @@ void Ticks::look(double t_s) {
 }
 
 void Ticks::plan(const dynamics::State& s, double t_s) {
-  const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
-  if (!scene_.steered || !source_ || s.step % period != 0) return;
+  if (!scene_.steered || !source_ || !cadence_.due(s.step, s.q, s.qd)) return;
   look(t_s);
   causes_.size = 0;
   const double age_s = view_.at(t_s, s.q, causes_);
   planner::Input in{.step = s.step,
                     .t_s = t_s,
-                    .dt_s = static_cast<double>(period) * scene_.dynamics.dt_s,
+                    .dt_s = scene_.planner.period_steps * scene_.dynamics.dt_s,
                     .q = s.q,
                     .qd = s.qd,
                     .obstacles = view_.obstacles(),

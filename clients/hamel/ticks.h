@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "common/scene/scene.h"
+#include "common/scene/cadence.h"
 #include "common/wire/messages.h"
 #include "services/dynamics/arm.h"
 #include "services/perception/core/source.h"
@@ -32,6 +32,8 @@ class Ticks {
 
   const dynamics::Arm& arm() const { return arm_; }
   const planner::Report& report() const { return output_.report; }
+  /// Planner cycles so far.
+  std::uint64_t cycles() const { return planner_.memory().cycles; }
   const Eigen::VectorXd& torque_Nm() const { return output_.torque_Nm; }
 
  private:
@@ -39,6 +41,7 @@ class Ticks {
 
   const scene::Scene& scene_;
   dynamics::Arm arm_;
+  scene::Cadence cadence_;
   planner::Planner planner_;
   planner::Output output_;
   planner::ObstacleView view_;

@@ -13,6 +13,12 @@ using lie::Wrench;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+/// Vdot_i = X_i Vdot_{i-1} + [V_i, A_i] qd_i: Eq. (5) differentiated with qdd = 0
+void bias_twist(const model::Chain& chain, const Workspace& ws, int i, double qd_i, Twist& Vdot) noexcept {
+  if (i > 0) Vdot = lie::Ad_inv(ws.X_PB[at(i)], Vdot);
+  Vdot += lie::ad(ws.V_B[at(i)], chain.A_B(i)) * qd_i;
+}
+
 /// X_PB(q) = X_PJ exp(A q), Eq. (3).
 Pose pose_in_parent(const model::Joint& joint, double q) {
   if (joint.kind == model::JointKind::prismatic)
@@ -127,15 +133,26 @@ void add_wrench(const model::Chain& chain, const Workspace& ws, int link, const 
   }
 }
 
+void bias_twists(const model::Chain& chain, const Workspace& ws, Ref<const VectorXd> qd,
+                 std::vector<lie::Twist>& Vdot_B) noexcept {
+  assert(qd.size() == chain.n() && Vdot_B.size() == at(chain.n()));
+  Twist Vdot = Twist::Zero();
+  for (int i = 0; i < chain.n(); ++i) {
+    bias_twist(chain, ws, i, qd[i], Vdot);
+    Vdot_B[at(i)] = Vdot;
+  }
+}
+
 Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link,
                                         const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept {
   assert(qd.size() == chain.n() && link < chain.n());
-  // Vdot_i = X_i Vdot_{i-1} + [V_i, A_i] qd_i: Eq. (5) differentiated with qdd = 0
   Twist Vdot = Twist::Zero();
-  for (int i = 0; i <= link; ++i) {
-    if (i > 0) Vdot = lie::Ad_inv(ws.X_PB[at(i)], Vdot);
-    Vdot += lie::ad(ws.V_B[at(i)], chain.A_B(i)) * qd[i];
-  }
+  for (int i = 0; i <= link; ++i) bias_twist(chain, ws, i, qd[i], Vdot);
+  return point_bias_acceleration(ws, link, p_W, Vdot);
+}
+
+Eigen::Vector3d point_bias_acceleration(const Workspace& ws, int link, const Eigen::Vector3d& p_W,
+                                        const lie::Twist& Vdot) noexcept {
   const Pose& X_WB = ws.X_WB[at(link)];
   const Twist& V = ws.V_B[at(link)];
   const Eigen::Vector3d r = inverse(X_WB) * p_W, w = V.head<3>(), wdot = Vdot.head<3>();

@@ -52,7 +52,14 @@ void space_jacobian(const model::Chain& chain, const Workspace& ws, int link, Re
 /// axes [N m], [N].  Add it to tau of forward_dynamics(), take it off tau of inverse_dynamics().
 void add_wrench(const model::Chain& chain, const Workspace& ws, int link, const lie::Wrench& F_W,
                 Ref<VectorXd> tau) noexcept;
-/// Acceleration of the point of `link` now at p_W when qdd = 0 (Jdot qd), world axes.  Needs velocities().
+/// Vdot_B: the derivative of each link's twist in its own frame when qdd = 0, size n.  Eq. (5)
+/// differentiated. Needs velocities().
+void bias_twists(const model::Chain& chain, const Workspace& ws, Ref<const VectorXd> qd,
+                 std::vector<lie::Twist>& Vdot_B) noexcept;
+/// Acceleration of the point of `link` now at p_W when qdd = 0 (Jdot qd), world axes.  Needs bias_twists().
+Eigen::Vector3d point_bias_acceleration(const Workspace& ws, int link, const Eigen::Vector3d& p_W,
+                                        const lie::Twist& Vdot_B) noexcept;
+/// The same for one point alone; needs velocities().
 Eigen::Vector3d point_bias_acceleration(const model::Chain& chain, const Workspace& ws, int link,
                                         const Eigen::Vector3d& p_W, Ref<const VectorXd> qd) noexcept;
 /// M (n x n, both triangles), armature included.

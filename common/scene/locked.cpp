@@ -139,6 +139,7 @@ void freeze(Scene& s, const Values& at) {
     const auto i = static_cast<std::size_t>(shape.link);
     shape.X_LS = X_CB[i] * shape.X_LS;
     shape.link = carrier[i];
+    shape.was_link = shape.link < 0;
   }
   std::erase_if(s.robot.self_pairs, [&](const auto& pair) {
     return s.robot.shapes[pair.first].link == s.robot.shapes[pair.second].link;

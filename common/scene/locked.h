@@ -21,7 +21,8 @@ Problems lock_problems(const Scene& s);
 
 /// Takes the locked joints out of robot, q0, qd0 and goal: each link they carry becomes part of the one
 /// before it (of the base, where it is the first): mass, centre, inertia, shapes, end effector.  Exact: the
-/// other joints move as under the constraint.  Links keep the name of the part next to the base.
+/// other joints move as under the constraint, and shapes are measured against the same obstacles as before
+/// (LinkShape::was_link).  Links keep the name of the part next to the base.
 void freeze(Scene& s, const std::vector<std::optional<double>>& at);
 /// Keeps them and holds them by kHeldArmature.
 void hold(Scene& s, const std::vector<std::optional<double>>& at);

@@ -48,7 +48,7 @@ std::vector<Candidate> candidates(const Robot& robot, int link, double most_m) {
   std::vector<Candidate> out;
   for (std::size_t k = 0; k < robot.shapes.size(); ++k) {
     const LinkShape& s = robot.shapes[k];
-    if (s.link != link || s.shape.kind == ShapeKind::half_space) continue;
+    if (part_of(s) != link || s.shape.kind == ShapeKind::half_space) continue;
     const Capsule c = s.X_LS * geometry::tight_capsule(s.shape);
     if (c.excess_m <= most_m) out.push_back({k, c});
   }
@@ -62,7 +62,7 @@ double simplify_shapes(Robot& robot, double most_m) {
   const std::size_t count = robot.shapes.size();
   std::vector<std::size_t> stands_for(count);  // the shape that a shape became part of
   for (std::size_t k = 0; k < count; ++k) stands_for[k] = k;
-  for (int link = -1; link < robot.chain.n(); ++link) {
+  for (int link = kLockedOn; link < robot.chain.n(); ++link) {
     const std::vector<Candidate> all = candidates(robot, link, most_m);
     std::vector<Capsule> members;
     for (const Candidate& c : all) members.push_back(c.capsule);

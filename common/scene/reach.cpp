@@ -114,8 +114,8 @@ Reach::Reach(const Robot& robot, const PlannerOptions& options)
       margin_m_(options.barrier_gain > 0 ? options.dmin_m : 0) {
   for (const LinkShape& s : robot.shapes) {
     const geometry::Capsule c = s.X_LS * geometry::enclosing_capsule(s.shape);
-    bodies_.push_back({s.link, geometry::solid(s.shape, s.X_LS)});
-    add_ball(ball_of(chain_, s.link, c));
+    bodies_.push_back({part_of(s), geometry::solid(s.shape, s.X_LS)});
+    add_ball(ball_of(chain_, part_of(s), c));
   }
 }
 
@@ -156,11 +156,12 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
   rbd::positions(chain_, q, ws_);
   const std::size_t m = bodies_.size();
   near_m_.assign(set.size() * m, inf);
-  nearest_m_.assign(static_cast<std::size_t>(chain_.n()), inf);
+  nearest_m_.assign(slot(kLockedOn) + 1, inf);
   for (std::size_t b = 0; b < m; ++b) {
-    if (bodies_[b].link < 0) continue;  // what stands cannot run into it
-    const auto link = static_cast<std::size_t>(bodies_[b].link);
-    const geometry::Solid solid_W = ws_.X_WB[link] * bodies_[b].solid_B;
+    if (bodies_[b].link == -1) continue;  // what stands cannot run into it
+    const std::size_t link = slot(bodies_[b].link);
+    const lie::Pose& X_WB = bodies_[b].link < 0 ? chain_.X_WB0() : ws_.X_WB[link];
+    const geometry::Solid solid_W = X_WB * bodies_[b].solid_B;
     for (std::size_t k = 0; k < set.size(); ++k) {
       if (!stands(set[k])) continue;
       const geometry::Solid there = geometry::solid(set[k].shape, set[k].X_WO);
@@ -177,8 +178,8 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
     const double grown = inflation_m(set[k]);
     bool matters = !stands(set[k]) || may_cover_target(distance_m(target_.centre_W, set[k]), kSlack_m, grown);
     for (std::size_t b = 0; b < m && !matters; ++b) {
-      if (bodies_[b].link < 0) continue;
-      const double most = std::max(rho0_m_ + grown, nearest_m_[static_cast<std::size_t>(bodies_[b].link)]);
+      if (bodies_[b].link == -1) continue;
+      const double most = std::max(rho0_m_ + grown, nearest_m_[slot(bodies_[b].link)]);
       matters = !(near_m_[k * m + b] > most + 2 * kNear_m + kSlack_m);
     }
     if (matters) kept.push_back(set[k]);
@@ -225,10 +226,10 @@ void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
   const auto n = static_cast<std::size_t>(chain_.n());
   const std::size_t m = centres_.size();
   kept.clear();
-  floor_m.assign(n + 1, inf);
+  floor_m.assign(n + 2, inf);
   sift_roughly(set, horizon_s, floor_m);
   near_m_.resize(left_.size() * m);
-  nearest_m_.assign(n + 1, inf);  // an upper bound of how far the obstacle nearest to each link is
+  nearest_m_.assign(n + 2, inf);  // an upper bound of how far the obstacle nearest to each link is
   for (std::size_t k = 0; k < left_.size(); ++k) {
     const geometry::Obstacle& o = set[left_[k]];
     const bool plain = is_plain(o);
@@ -244,7 +245,7 @@ void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
     }
   }
   nearest_m_[n] = -inf;  // of the base it does not matter
-  floor_m.pop_back();
+  floor_m.resize(n);
   for (std::size_t k = 0; k < left_.size(); ++k) {
     const geometry::Obstacle& o = set[left_[k]];
     const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o);

@@ -11,9 +11,13 @@
 
 namespace hamel::scene {
 
+inline constexpr int kLockedOn = -2;  ///< in place of a link: those that locked joints made part of the base
+/// The link of a shape, -1 for the base, or kLockedOn.
+inline int part_of(const LinkShape& s) noexcept { return s.was_link ? kLockedOn : s.link; }
+
 /// A ball that the axis of a link's capsule never leaves.
 struct ReachBall {
-  int link = 0;  ///< -1: the base, which what moves may run into
+  int link = 0;  ///< -1: the base, which only what moves may run into; kLockedOn
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
   double axis_m = 0;    ///< how far from the centre the capsule's axis may be; +inf: a slide without limits
   double radius_m = 0;  ///< of the capsule
@@ -75,8 +79,10 @@ class Reach {
     double axis_m = 0, out_m = 0;  ///< of a capsule's axis; of its surface
   };
   void add_ball(const ReachBall& ball);
-  /// Links, then the base.
-  std::size_t slot(int link) const noexcept { return static_cast<std::size_t>(link < 0 ? chain_.n() : link); }
+  /// Links, then the base, then what is locked onto it.
+  std::size_t slot(int link) const noexcept {
+    return static_cast<std::size_t>(link < 0 ? chain_.n() - 1 - link : link);
+  }
   void sift_roughly(std::span<const geometry::Obstacle> set, double horizon_s, std::vector<double>& floor_m);
   double spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
   bool may_cover_target(double distance_m, double way_m, double grown_m) const noexcept;

@@ -12,6 +12,13 @@
 namespace hamel::scene {
 namespace {
 
+using Options = ReduceOptions;
+constexpr NamedChoice kChoices[] = {
+    {"locked", &Options::locked}, {"plane", &Options::plane},   {"gravity", &Options::gravity},
+    {"self", &Options::self},     {"shapes", &Options::shapes}, {"obstacles", &Options::obstacles},
+    {"links", &Options::links},   {"merge", &Options::merge},   {"requery", &Options::requery},
+    {"rate", &Options::rate},     {"cycle", &Options::cycle},   {"step", &Options::step}};
+
 constexpr double kParallel = 1e-12;  // gravity that is off an axis by less is along it
 
 void reduce_fixed(Scene& s) {
@@ -39,11 +46,12 @@ void reduce_locked(Scene& s) {
 
 void reduce_plane(Scene& s) {
   const bool planar = rbd::is_planar(s.robot.chain);
-  const bool asked_off = s.dynamics.space == Space::se3 || !wanted(s.reduce, s.reduce.plane, true);
-  const bool on = planar && !asked_off;
+  const bool wish = wanted(s.reduce, s.reduce.plane, true), spatial = s.dynamics.space == Space::se3;
+  const bool on = planar && wish && !spatial;
   if (planar && !on) s.dynamics.space = Space::se3;
   const std::string why = !planar ? "revolute axes are not all parallel, or a slide is not across them"
                           : on    ? "all revolute axes parallel, all slides across them"
+                          : wish  ? "dynamics.space is se3"
                                   : "forbidden";
   sizes(note(s, "plane", on, on ? "SE(2) in place of SE(3)" : "SE(3)", why), 6, on ? 3 : 6,
         "numbers in a twist");
@@ -140,8 +148,9 @@ void note_obstacles(Scene& s) {
   const int n = s.robot.chain.n();
   sizes(note(s, "links", skip && far > 0,
              count(skip ? far : 0, "links not asked for distances while others are nearer"),
-             skip ? "no standing obstacle comes within rho0 of them; their report shows none"
-                  : "fidelity: fastest would; commands stay the same, but their report shows no distance"),
+             !skip     ? "fidelity: fastest would; commands stay the same, but their report shows no distance"
+             : far > 0 ? "no standing obstacle comes within rho0 of them; their report shows none"
+                       : "standing obstacles may come within rho0 of every link, or there are none"),
         n, n - static_cast<int>(skip ? far : 0), "links");
 }
 
@@ -171,6 +180,22 @@ void reduce(Scene& s) {
   note_obstacles(s);
   reduce_bounded(s);
   note_shared(s);
+}
+
+std::span<const NamedChoice> choices() noexcept { return kChoices; }
+
+std::vector<std::string> refused(const Scene& s) {
+  std::vector<std::string> out;
+  for (const NamedChoice& c : kChoices) {
+    if (s.reductions.empty() || s.reduce.*c.choice != Choice::on) continue;
+    const auto r = std::find_if(s.reductions.begin(), s.reductions.end(),
+                                [&](const Reduction& x) { return x.name == c.name; });
+    if (r == s.reductions.end())
+      out.push_back(std::string(c.name) + ": the scene is not steered");
+    else if (!r->in_force)
+      out.push_back(std::string(c.name) + ": " + r->why);
+  }
+  return out;
 }
 
 std::string names_in_force(const Scene& s) {

@@ -4,7 +4,9 @@
 /// Exact reductions change no result beyond rounding: positions, commands, reports.  Bounded ones change it
 /// by no more than they say; only Fidelity::fastest, or a Choice of `on`, puts them in force.
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include "common/scene/scene.h"
 
@@ -30,10 +32,23 @@ namespace hamel::scene {
 ///              commands stay the same, reported distances are off.  Only where it is `on`
 ///   rate       bounded [m]: scripted obstacles are published no faster than carrying them on needs
 ///   cycle      bounded [m]: planner cycles no faster than needed for nothing to close in by more between
-///              two, at twice the speed that the end effector is drawn with and those of scripted obstacles
-///              (a singular start may be faster: explain measures it).  Only where it is `on`
+///              two that are farther apart than as written, and as often as written while a point of the arm
+///              is faster than 1.5 times what the end effector is drawn with (cadence.h).  The bound is that
+///              of twice that speed and of the scripted obstacles': it holds as long as no point of the arm
+///              becomes faster by more than the number of steps put together times that speed within one
+///              written period.  Only where it is `on`
 ///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
 void reduce(Scene& s);
+
+/// A reduction of `reduce { }` by the name of its field.
+struct NamedChoice {
+  const char* name;
+  Choice ReduceOptions::*choice;
+};
+std::span<const NamedChoice> choices() noexcept;
+
+/// What was asked for by `on` and is not in force: "merge: no capsules around ...", name and reason.
+std::vector<std::string> refused(const Scene& s);
 
 /// True where an option's reduction is to be in force.
 bool wanted(const ReduceOptions& o, Choice choice, bool exact) noexcept;

@@ -14,8 +14,11 @@ namespace {
 constexpr double kLeastStreamHz = 30;   // a stream is resampled at least so often
 constexpr double kSetsInStaleness = 3;  // so many sets come while one of them would still be fresh
 constexpr double kSlowestCycle_s = 0.01;
+// Seldomer cycles, as long as no point of the arm is faster than so many times what the end effector is drawn
+// with: barrier, circulation and other links may be.
+constexpr double kHurry = 1.5;
 constexpr double kOvershoot =
-    2;  // an end effector may be faster than it is drawn: by barrier and circulation
+    2;  // the bound goes by it: room for what the arm speeds up in one written period
 const std::string kWouldBe = "fidelity: fastest would";
 
 Reduction& note_bounded(Scene& s, const std::string& name, bool on, const std::string& what,
@@ -41,7 +44,8 @@ void note_merge(Scene& s) {
       : wish ? "no capsules around some reach as little beyond them as asked"
              : kWouldBe + " look for some");
   sizes(r, static_cast<double>(all.size()), static_cast<double>(merged.size()), "obstacles");
-  r.bound = on && moving ? std::max(merge.excess_m(), s.accuracy.obstacle_error_m) : merge.excess_m();
+  // Of what comes within rho0; farther off it grows in proportion.
+  r.bound = on ? std::min(moving ? kInf : merge.excess_m(), s.accuracy.obstacle_error_m) : 0;
   r.live = on;
 }
 
@@ -87,20 +91,27 @@ double fastest_obstacle_mps(const Scene& s) {
   return fastest;
 }
 
-/// A planner cycle is needed each time the end effector at twice its greatest wanted speed and the fastest
-/// obstacle may have closed in by what a surface may be off.
+/// A planner cycle is needed each time the arm at twice the greatest speed wanted of its end effector and the
+/// fastest obstacle may have closed in by what a surface may be off; as often as written while a point of the
+/// arm is nearly so fast.
 void reduce_cycle(Scene& s) {
   const double closing_mps = kOvershoot * s.planner.vmax_mps + fastest_obstacle_mps(s);
   const double needed_s = std::min(s.accuracy.obstacle_error_m / closing_mps, kSlowestCycle_s);
   const int before = s.planner.period_steps;
-  const int needed = static_cast<int>(std::floor(needed_s / s.dynamics.dt_s * (1 + 1e-9)));
+  const int needed =
+      before * static_cast<int>(std::floor(needed_s / (before * s.dynamics.dt_s) * (1 + 1e-9)));
   const bool less = needed > before, on = less && s.reduce.cycle == Choice::on;
-  if (on) s.planner.period_steps = needed;
+  if (on) {
+    s.planner.period_steps = needed;
+    s.planner.hurry_steps = before;
+    s.planner.hurry_mps = kHurry * s.planner.vmax_mps;
+  }
   const std::string why =
       std::isinf(closing_mps) ? "no speed limits how fast the arm or an obstacle closes in"
       : !less                 ? "the arm's and the obstacles' speeds need one each " + number(needed_s) + " s"
-      : on ? "what closes in at up to twice vmax_mps and the obstacles' speeds does so by no more than the "
-             "bound"
+      : on ? "nothing closes in by more than the bound between two; as often as written while a point of the "
+             "arm is faster than " +
+                 number(s.planner.hurry_mps) + " m/s"
            : "reduce { cycle: on } would; fidelity: fastest chooses the planner's period with the step";
   Reduction& r =
       note_bounded(s, "cycle", on, on ? "planner cycles less often" : "planner cycles as written", why);

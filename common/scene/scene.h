@@ -22,6 +22,8 @@ struct LinkShape {
   int link = -1;  ///< 0..n-1; -1: the base, which does not move
   geometry::Shape shape;
   lie::Pose X_LS;  ///< shape frame in the link's frame
+  /// Of the base: once of a link that locked joints made part of it, which nothing that stands may touch.
+  bool was_link = false;
 };
 
 /// A chain, what surrounds its links, and the text it came from.

@@ -68,6 +68,7 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
     : scene_(scene),
       config_(config),
       arm_(scene_),
+      cadence_(scene_),
       fingerprint_(scene::fingerprint(scene)),
       incarnation_(config.incarnation != 0 ? config.incarnation : fresh_incarnation(config.pace)),
       state_out_(node),
@@ -128,11 +129,12 @@ void DynamicsService::take_modes() {
   }
 }
 
-bool DynamicsService::awaits_command() const {
+bool DynamicsService::awaits_command() {
   if (!scene_.steered) return false;
+  const dynamics::State& s = arm_.state();
   const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
-  const std::uint64_t boundary = arm_.state().step / period * period;
-  return !command_step_ || *command_step_ < boundary;
+  if (!command_step_ || *command_step_ < s.step / period * period) return true;
+  return *command_step_ < s.step && cadence_.due(s.step, s.q, s.qd);
 }
 
 bool DynamicsService::poll_lockstep(Time now) {

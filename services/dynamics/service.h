@@ -9,6 +9,7 @@
 #include "common/runtime/log.h"
 #include "common/runtime/loop.h"
 #include "common/runtime/presence.h"
+#include "common/scene/cadence.h"
 #include "common/wire/endpoint.h"
 #include "services/dynamics/arm.h"
 #include "services/dynamics/trajectory_hash.h"
@@ -60,7 +61,7 @@ class DynamicsService final : public runtime::Service {
   bool owner_is_silent() const;
   double command_age_s() const;
   double command_stale_s() const;
-  bool awaits_command() const;
+  bool awaits_command();
   bool at_end() const;
   Drive choose_drive();
   bool step();
@@ -77,6 +78,7 @@ class DynamicsService final : public runtime::Service {
   const scene::Scene scene_;
   const ServiceConfig config_;
   Arm arm_;
+  scene::Cadence cadence_;
   TrajectoryHash hash_;
   const std::uint64_t fingerprint_;
   std::uint64_t incarnation_ = 1, last_step_ = 0;

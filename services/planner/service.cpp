@@ -33,6 +33,7 @@ PlannerService::PlannerService(bus::Node& node, const scene::Scene& scene, const
     : scene_(scene),
       config_(config),
       fingerprint_(scene::fingerprint(scene)),
+      cadence_(scene_),
       planner_(scene_.robot, scene_.planner, savings(scene_)),
       output_(planner_.output()),
       goal_(scene.goal),
@@ -124,9 +125,9 @@ bool PlannerService::take_states(Time now) {
     last_state_ = now;
     if (incarnation_ != s.incarnation) meet(s);
     // In lockstep the same state again means that our answer was lost: answer it again.
-    const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
-    if (s.step % period != 0) continue;
+    if (!cadence_.due(s.step, s.position, s.velocity)) continue;
     if (leaps(s, now)) continue;
+    const auto period = static_cast<std::uint64_t>(scene_.planner.period_steps);
     if (have_state_ && config_.pace == scene::Pace::realtime && s.step > state_.step + period)
       ++commands_late_;
     state_ = s;

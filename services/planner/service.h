@@ -12,6 +12,7 @@
 #include "common/runtime/log.h"
 #include "common/runtime/loop.h"
 #include "common/runtime/presence.h"
+#include "common/scene/cadence.h"
 #include "common/wire/endpoint.h"
 #include "services/planner/core/escape.h"
 #include "services/planner/core/planner.h"
@@ -65,6 +66,7 @@ class PlannerService final : public runtime::Service {
   const scene::Scene scene_;
   const ServiceConfig config_;
   const std::uint64_t fingerprint_;
+  scene::Cadence cadence_;
   Planner planner_;
   Output output_;
   std::uint64_t epoch_ = 1;  ///< strength * 2^32 + starts

@@ -88,4 +88,12 @@ MUTANTS = [
            "attraction.target(), turns, margin_m - slack", "attraction.target(), turns, margin_m - slack - 1", "planner_states_test", "*InsideWhatStands*"),
     Mutant("target_behind", "a moving target is followed", "common/lie/se3.h", "X.p += t_s *", "X.p -= t_s *",
            "planner_goals_test", "*Followed*"),
+    Mutant("merged_too_far", "obstacles are put together within the bound", "common/scene/outward.cpp", "room.push_back(most_m_ *",
+           "room.push_back(2 * most_m_ *", "scene_outward_test", "MergedObstacles.*"),
+    Mutant("cycles_never_hurry", "cycles as often as written while a point is fast", "common/scene/cadence.cpp", "<= hurry_mps_);",
+           "<= 2 * hurry_mps_);", "scene_outward_test", "Cycle.*"),
+    Mutant("locked_on_is_base", "what is locked onto the base keeps its nearest", "common/scene/reach.cpp", "nearest_m_[n] = -inf;",
+           "nearest_m_[n] = nearest_m_[n + 1] = -inf;", "scene_reduce_test", "*Locked*"),
+    Mutant("rests_too_long", "a link that is not asked went no farther than the bound", PLAN + "pairs.cpp",
+           "std::min(savings_.requery_m, a.spare_m)", "a.spare_m", "planner_savings_test", "SeldomAsked.*"),
 ]

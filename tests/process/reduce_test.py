@@ -74,6 +74,27 @@ class Fastest(unittest.TestCase):
         _, seldom = outcome("run", scene("panda_reach"), "--duration", "0.2", "--set", "reduce.requery=on")
         self.assertEqual(plain["trajectory_hash"], seldom["trajectory_hash"])
 
+    def test_cycles_that_hurry_are_the_same_in_one_loop_and_over_a_bus(self):
+        fast = ["--set", "qd0=[0.5, 0, 0, 0]", "--set", "planner.vmax_mps=0.5", "--set", "duration_s=0.5"]
+        seldom = ["--set", "accuracy.obstacle_error_m=0.01", "--set", "reduce.cycle=on"]
+        _, o = outcome("run", scene("four_link_avoid"), *fast, *seldom)
+        _, fixed = outcome("run", scene("four_link_avoid"), *fast, "--set", "planner.period_steps=10")
+        self.assertNotEqual(o["trajectory_hash"], fixed["trajectory_hash"])
+        with tempfile.TemporaryDirectory() as folder:
+            table, out = pathlib.Path(folder, "one.csv"), pathlib.Path(folder, "out.csv")
+            table.write_text("planner.kobs\n4\n")
+            self.assertEqual(hamel("batch", table, "--scene", scene("four_link_avoid"), "-o", out, *fast, *seldom)[0], 0)
+            self.assertIn(o["trajectory_hash"], out.read_text())
+
+    def test_what_is_asked_for_and_cannot_be_done_is_said(self):
+        asked = ("--set", "reduce.locked=on", "--set", "reduce.plane=on", "--set", "reduce.obstacles=on")
+        _, o = outcome("run", scene("panda_reach"), "--duration", "0.1", *asked)
+        self.assertEqual([line.split(":")[0] for line in o["asked_for_but"]], ["locked", "plane"])
+        _, out, _ = hamel("run", scene("panda_reach"), "--duration", "0.1", *asked)
+        self.assertRegex(out, r"asked for, but +locked: no joint is locked\n")
+        _, out, _ = hamel("explain", scene("panda_reach"), "--seconds", "0.02", *asked)
+        self.assertIn("Asked for, but plane: revolute axes are not all parallel", out)
+
     def test_run_chooses_tier_and_step_and_keeps_to_the_accuracy(self):
         code, out, _ = hamel("explain", scene("three_link_swing"), "--json", "--seconds", "0.02", "--set", "fidelity=fastest",
                              "--set", "duration_s=10", "--set", "accuracy.joint_error_rad=1e-5")
@@ -135,6 +156,37 @@ class Batch(unittest.TestCase):
             self.assertEqual(code, 0)
             self.assertIn("going on after", err)
         self.assertEqual(out.read_bytes(), whole)
+
+    def test_altered_rows_are_done_again(self):
+        whole, _ = self.run_batch("whole.csv")
+        command = [BIN / "hamel", "batch", self.path / "grid.textproto", "-o", self.path / "cut.csv", "-j", "1"]
+        partial = self.path / "cut.csv.partial"
+
+        def kill_in_the_middle():
+            p = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            end = time.monotonic() + 60
+            while time.monotonic() < end and not (partial.exists() and partial.read_bytes().count(b"\n") >= 6):
+                time.sleep(0.001)
+            os.kill(p.pid, signal.SIGKILL)
+            p.wait()
+            return partial.read_bytes().splitlines(keepends=True) if partial.exists() else None
+
+        def altered(lines):  # a figure, a row left out, two that change places, a sum
+            yield lines[:3] + [lines[3].replace(b".", b".1", 1)] + lines[4:]
+            yield lines[:3] + lines[4:]
+            yield lines[:3] + [lines[4], lines[3]] + lines[5:]
+            yield lines[:3] + [lines[3][:-2] + (b"0\n" if lines[3][-2:-1] != b"0" else b"1\n")] + lines[4:]
+
+        lines = kill_in_the_middle()
+        if not lines:
+            return  # it was done before the kill
+        for k, text in enumerate(altered(lines)):
+            partial.write_bytes(b"".join(text))
+            code, _, err = hamel(*command[1:])
+            self.assertEqual(code, 0, err)
+            self.assertIn("going on after 1 of 15", err)
+            self.assertIn("done again", err)
+            self.assertEqual((self.path / "cut.csv").read_bytes(), whole, k)
 
     def test_nothing_that_is_read_or_of_another_batch_is_written_over(self):
         grid = self.path / "grid.textproto"

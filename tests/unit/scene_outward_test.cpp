@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/rbd/rbd.h"
+#include "common/scene/cadence.h"
 #include "common/scene/outward.h"
 #include "common/scene/reduce.h"
 #include "tests/support/reduce_scene.h"
@@ -171,7 +173,7 @@ TEST(MergedObstacles, OfUnknownOrTurningWayStayAsTheyAre) {
   EXPECT_EQ(merge.excess_m(), 0);
 }
 
-/// Nothing closes in by more than the bound between two cycles, at the greatest speeds there are.
+/// Nothing closes in by more than the bound between two cycles, at twice the speed the arm is drawn with.
 TEST(Cycle, IsAsLongAsTheSpeedsAllow) {
   test::Random rng(61);
   int longer = 0;
@@ -190,9 +192,12 @@ TEST(Cycle, IsAsLongAsTheSpeedsAllow) {
     const double closes = (2 * s.planner.vmax_mps + fastest) * s.planner.period_steps * s.dynamics.dt_s;
     if (!r->in_force) {
       EXPECT_EQ(s.planner.period_steps, 1);
+      EXPECT_EQ(s.planner.hurry_steps, 0);
       continue;
     }
     ++longer;
+    EXPECT_EQ(s.planner.hurry_steps, 1);
+    EXPECT_LT(s.planner.hurry_mps, 2 * s.planner.vmax_mps);
     EXPECT_NEAR(r->bound, closes, 1e-12);
     EXPECT_LE(closes, s.accuracy.obstacle_error_m * (1 + 1e-6));
     const bool longest = closes + (2 * s.planner.vmax_mps + fastest) * s.dynamics.dt_s >
@@ -201,6 +206,66 @@ TEST(Cycle, IsAsLongAsTheSpeedsAllow) {
     EXPECT_TRUE(longest) << "one step more would do";
   }
   EXPECT_GT(longer, 300);
+}
+
+/// Cycles are put together in whole ones as written, and come as often as written while any point of the arm
+/// is fast, whichever link it is on.
+TEST(Cycle, IsAsOftenAsWrittenWhileThePointsAreFast) {
+  test::Random rng(63);
+  for (int k = 0; k < 200; ++k) {
+    Scene s = test::random_scene(rng, k % 2 == 0, 0);
+    s.perception.obstacles.clear();
+    s.planner.vmax_mps = 0.1;
+    s.planner.period_steps = 2;
+    s.dynamics.dt_s = 1e-3;
+    s.accuracy.obstacle_error_m = 1.5e-3;
+    s.reduce.cycle = Choice::on;
+    reduce(s);
+    ASSERT_EQ(s.planner.period_steps, 6);  // 7.5 fit, and 6 are whole ones
+    Cadence cadence(s);
+    const int n = s.robot.chain.n();
+    const Eigen::VectorXd q = rng.vector(n, 1);
+    Eigen::VectorXd qd = rng.vector(n, 1), slow = qd;
+    const double speed = cadence.fastest_mps(q, qd);
+    qd *= 1.001 * s.planner.hurry_mps / speed;
+    slow *= 0.999 * s.planner.hurry_mps / speed;
+    for (std::uint64_t step = 0; step < 20; ++step) {
+      EXPECT_EQ(cadence.due(step, q, qd), step % 2 == 0);
+      EXPECT_EQ(cadence.due(step, q, slow), step % 6 == 0);
+    }
+    qd[0] = std::nan("");
+    EXPECT_TRUE(cadence.due(2, q, qd));
+  }
+}
+
+/// No point of the links, nor the end effector, goes farther in a short time than the speed found.
+TEST(Cycle, KnowsTheFastestPointOfTheArm) {
+  test::Random rng(65);
+  double nearest = 0;
+  for (int k = 0; k < 200; ++k) {
+    Scene s = test::random_scene(rng, false, 0);
+    test::clothe(s.robot, rng);
+    const model::Chain& chain = s.robot.chain;
+    Cadence cadence(s);
+    const Eigen::VectorXd q = rng.vector(chain.n(), 1), qd = rng.vector(chain.n(), 1);
+    const double fastest = cadence.fastest_mps(q, qd), h = 1e-6;
+    rbd::Workspace a(chain), b(chain);
+    rbd::positions(chain, q - h * qd, a);
+    rbd::positions(chain, q + h * qd, b);
+    double most = (rbd::tip(chain, b).p - rbd::tip(chain, a).p).norm() / (2 * h);
+    for (const LinkShape& shape : s.robot.shapes)
+      for (int i = 0; shape.link >= 0 && i < 20; ++i) {
+        const geometry::Capsule c = geometry::enclosing_capsule(shape.shape);
+        const bool round = shape.shape.kind == geometry::ShapeKind::capsule;
+        const double radius = round ? c.radius_m : 0;
+        const Eigen::Vector3d p_L = shape.X_LS * ((rng.coin(0.5) ? c.p0 : c.p1) + radius * rng.unit());
+        const auto link = static_cast<std::size_t>(shape.link);
+        most = std::max(most, (b.X_WB[link] * p_L - a.X_WB[link] * p_L).norm() / (2 * h));
+      }
+    EXPECT_LE(most, fastest * (1 + 1e-6));
+    nearest = std::max(nearest, most / fastest);
+  }
+  EXPECT_GT(nearest, 0.95) << "half of it would not be enough";
 }
 
 }  // namespace

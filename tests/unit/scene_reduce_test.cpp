@@ -314,5 +314,56 @@ TEST(Reductions, AreForbiddenAndForced) {
   EXPECT_EQ(forbidden.reductions.size(), once) << "twice changes nothing more";
 }
 
+/// Of the base only what moves matters; what locked joints made part of it keeps its nearest obstacle.
+TEST(Obstacles, NearestToWhatIsLockedOntoTheBaseStay) {
+  test::Random rng(11);
+  Scene s = test::random_scene(rng, false, 0);
+  const lie::Pose& X_WB0 = s.robot.chain.X_WB0();
+  s.robot.shapes.push_back(
+      {-1, {geometry::ShapeKind::sphere, {0.05, 0, 0}}, {Eigen::Matrix3d::Identity(), {20, 0, 0}}});
+  std::vector<geometry::Obstacle> set{test::sphere(1, X_WB0 * Eigen::Vector3d(20, 0.5, 0), 0.05)}, kept;
+  for (std::uint32_t id = 2; id <= 20; ++id)
+    set.push_back(test::sphere(id, X_WB0.p + rng.uniform(0.5, 1) * rng.unit(), 0.05));
+  std::vector<double> floor_m;
+  for (const bool was_link : {false, true}) {
+    s.robot.shapes.back().was_link = was_link;
+    Reach reach(s.robot, s.planner);
+    reach.sift(set, 0, kept, floor_m);
+    EXPECT_EQ(holds(kept, 1), was_link);
+    EXPECT_EQ(floor_m.size(), static_cast<std::size_t>(s.robot.chain.n()));
+    reach.sift_near(s.q0, set, kept);
+    EXPECT_EQ(holds(kept, 1), was_link);
+  }
+}
+
+TEST(Asked, ForWhatCannotBeDoneIsSaid) {
+  test::Random rng(5);
+  Scene s = test::random_scene(rng, false, 0);
+  s.perception.obstacles.clear();
+  s.robot.self_pairs.clear();
+  s.robot.shapes.clear();
+  s.planner.vmax_mps = kInf;
+  for (const NamedChoice& c : choices()) s.reduce.*c.choice = Choice::on;
+  const auto said = [](const Scene& of, const std::string& name) {
+    for (const std::string& line : refused(of))
+      if (line.starts_with(name + ": ")) return line.size() > name.size() + 5;
+    return false;
+  };
+  Scene reduced = s;
+  EXPECT_TRUE(refused(reduced).empty()) << "not reduced yet";
+  reduce(reduced);
+  for (const char* name : {"locked", "plane", "self", "links", "shapes", "merge", "cycle", "step"})
+    EXPECT_TRUE(said(reduced, name)) << name;
+  for (const char* name : {"obstacles", "requery"}) EXPECT_FALSE(said(reduced, name)) << name;
+  for (const NamedChoice& c : choices()) s.reduce.*c.choice = Choice::off;
+  reduced = s;
+  reduce(reduced);
+  EXPECT_TRUE(refused(reduced).empty()) << "nothing was asked for";
+  s.steered = false;
+  s.reduce.merge = Choice::on;
+  reduce(s);
+  EXPECT_EQ(refused(s), std::vector<std::string>{"merge: the scene is not steered"});
+}
+
 }  // namespace
 }  // namespace hamel::scene

@@ -22,6 +22,7 @@ Arm::Arm(const model::Chain& as_given)
       ws(chain),
       q(Eigen::VectorXd::Zero(n())),
       qd(q),
+      Vdot_B(static_cast<std::size_t>(n()), lie::Twist::Zero()),
       M(Eigen::MatrixXd::Identity(n(), n())),
       M_inverse(M),
       M_llt(M),
@@ -45,6 +46,7 @@ void Arm::update(const Eigen::VectorXd& q_now, const Eigen::VectorXd& qd_now) no
   qd.setZero();  // serves as the zero acceleration
   rbd::inverse_dynamics(chain, q_now, qd_now, qd, ws, coriolis);
   look(q_now, qd_now);
+  rbd::bias_twists(chain, ws, qd, Vdot_B);
   rbd::gravity_torque(with_gravity, ws, gravity);
   rbd::mass_matrix(chain, ws, M);
   momentum.noalias() = M * qd;

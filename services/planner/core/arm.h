@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <vector>
 
 #include "common/model/chain.h"
 #include "common/rbd/rbd.h"
@@ -25,6 +26,7 @@ struct Arm {
   model::Chain with_gravity;  ///< as given
   rbd::Workspace ws;
   Eigen::VectorXd q, qd;
+  std::vector<lie::Twist> Vdot_B;  ///< of the links at qdd = 0: rbd::bias_twists()
   Eigen::MatrixXd M, M_inverse;
   Eigen::LLT<Eigen::MatrixXd> M_llt;
   Eigen::VectorXd momentum;  ///< M qd

@@ -38,7 +38,7 @@ Pairs::Pairs(const scene::Robot& robot, const scene::PlannerOptions& options, co
   for (std::size_t k = 0; k < robot.shapes.size(); ++k) {
     const scene::LinkShape& s = robot.shapes[k];
     if (s.link < -1 || s.link >= robot.chain.n()) continue;
-    bodies_.push_back({k, 0, s.link, geometry::solid(s.shape, s.X_LS), {}});
+    bodies_.push_back({k, 0, s.link, geometry::solid(s.shape, s.X_LS), {}, s.was_link});
     if (s.link != robot.chain.n() - 1) continue;
     tip_E_.push_back(geometry::solid(s.shape, lie::inverse(robot.chain.X_NE()) * s.X_LS));
     const geometry::Solid tip = geometry::solid({}, {});  // a point
@@ -136,16 +136,16 @@ void Pairs::find(const Arm& arm, const Obstacles& obstacles, std::span<const dou
 }
 
 // The base does not move: there is nothing to steer, but who runs into it has touched the arm.  What stands
-// touches it by design.
+// touches it by design, but not a link locked onto it, whose clearance counts like that of any other.
 void Pairs::touch_base(const Arm& arm, Body& body, const Obstacles& obstacles) noexcept {
   const geometry::Solid& base_W = place(arm, body);
   for (const Obstacles::Item& item : obstacles.items()) {
     const bool stands = item.now.velocity_known && item.now.V_WO.isZero(0);
-    if (stands || geometry::distance_bound(base_W, item.solid) > 0) continue;
+    const double least = body.was_link ? clearance_m_ : std::min(clearance_m_, 0.0);
+    if ((stands && !body.was_link) || geometry::distance_bound(base_W, item.solid) > least) continue;
     const double d = geometry::closest(base_W, item.solid).distance_m;
-    if (!(d < 0)) continue;
-    base_touched_ = true;
-    clearance_m_ = std::min(clearance_m_, d);
+    clearance_m_ = d < least ? d : clearance_m_;
+    base_touched_ = base_touched_ || d < 0;
   }
 }
 
@@ -332,11 +332,13 @@ void Pairs::complete_self(const Arm& arm, std::size_t k) noexcept {
 }
 
 Vector3d Pairs::bias(const Arm& arm, const Pair& pair) const noexcept {
-  Vector3d a = rbd::point_bias_acceleration(arm.chain, arm.ws, pair.link, pair.at.on_axis, arm.qd);
+  const auto bias_of = [&arm](int link, const Vector3d& p_W) {
+    return rbd::point_bias_acceleration(arm.ws, link, p_W, arm.Vdot_B[static_cast<std::size_t>(link)]);
+  };
+  Vector3d a = bias_of(pair.link, pair.at.on_axis);
   const bool flat = !std::isfinite(pair.at.centre_m);
   const Vector3d there = flat ? pair.at.on_obstacle : Vector3d(pair.at.on_axis + pair.at.centre_m * pair.n);
-  if (pair.other_link >= 0)
-    a -= rbd::point_bias_acceleration(arm.chain, arm.ws, pair.other_link, there, arm.qd);
+  if (pair.other_link >= 0) a -= bias_of(pair.other_link, there);
   return a;
 }
 

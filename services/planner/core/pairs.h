@@ -75,7 +75,8 @@ class Pairs {
   };
   std::span<const Nearest> nearest() const noexcept { return nearest_; }
   double clearance_m() const noexcept { return clearance_m_; }
-  /// A moving obstacle is in the base, which no motion of the arm can prevent.
+  /// A moving obstacle is in the base, or any in a link locked onto it, which no motion of the arm can
+  /// prevent.
   bool base_touched() const noexcept { return base_touched_; }
   /// Smallest distance of two links that must not touch; +inf where none are within range.
   double self_clearance_m() const noexcept { return self_clearance_m_; }
@@ -96,6 +97,7 @@ class Pairs {
     std::size_t of_robot = 0;  ///< index of its shape
     int index = 0, link = 0;
     geometry::Solid solid_B, solid_W;
+    bool was_link = false;     ///< scene::LinkShape::was_link
     std::uint64_t placed = 0;  ///< solid_W is of this placing
   };
   /// Two bodies that must not touch; the first is nearer to the base.
