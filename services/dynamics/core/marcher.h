@@ -21,9 +21,10 @@ class Marcher {
   Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier);
 
   State start(const VectorXd& q0, const VectorXd& qd0) const;
-  /// Sizes fit and every number is finite: what comes from outside is not trusted.
-  bool acceptable(const State& s) const noexcept;
-  /// Integrator::step() for an acceptable state.
+  /// Makes `now` the node of `s`.  False when its sizes do not fit or a number is not finite: what comes from
+  /// outside is not trusted.
+  bool load(const State& s) noexcept;
+  /// Integrator::step() for the state that was loaded.
   StepReport step(State& s, const Load<G>& load) noexcept;
   double energy(const State& s) noexcept;
   /// The chain has got other inertias: p follows from q and qd.
@@ -32,7 +33,9 @@ class Marcher {
   void between(const State& before, const State& after, double share, VectorXd& q, VectorXd& qd) noexcept;
 
  private:
-  void load_state(const State& s) noexcept;
+  bool fits(const State& s) const noexcept;
+  bool holds(const State& s) const noexcept;
+  bool acceptable(const State& s) const noexcept;
   void store(State& s) const noexcept;
   bool sane(const StepReport& report, const Load<G>& load, double h) const noexcept;
   bool allowed(double made_up, double in_play) const noexcept;
