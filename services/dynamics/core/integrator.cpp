@@ -90,7 +90,7 @@ class Arm final : public Integrator::Impl {
 
   State start(const VectorXd& q0, const VectorXd& qd0) const override { return marcher_.start(q0, qd0); }
   StepReport step(State& state, const VectorXd& tau) noexcept override {
-    if (tau.size() != axis_.n() || !all_finite(tau) || !marcher_.load(state)) return {};
+    if (tau.size() != axis_.n() || !all_finite(tau)) return {};
     const int saturated = cut(tau);
     StepReport report = marcher_.step(state, load_);
     report.saturated = saturated;

@@ -17,8 +17,12 @@ constexpr double kEnergyBound = 0.1;
 /// kDriftLimit.
 constexpr double kDrift = 0.25, kDriftLimit = 0.5, kTrickle = 1e-3;
 
-bool same_bits(const double* a, const double* b, std::size_t count) noexcept {
-  return std::memcmp(a, b, count * sizeof *a) == 0;
+/// Number by number: wider loads would wait for stores of the last step that are still under way.
+bool same(const VectorXd& a, const VectorXd& b) noexcept {
+  const double *x = a.data(), *y = b.data();
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (x[i] != y[i]) return false;
+  return true;
 }
 
 }  // namespace
@@ -60,20 +64,18 @@ bool Marcher<G>::acceptable(const State& s) const noexcept {
   return fits(s) && all_finite(s.q) && all_finite(s.p) && all_finite(s.qd) && all_finite(s.history);
 }
 
-/// True when `s` is, bit for bit, what `now` was stored to.
+/// True when `s` is what `now` was stored to.
 template <class G>
 bool Marcher<G>::holds(const State& s) const noexcept {
-  const double ledger[] = {ledger_.made_up, ledger_.exchanged};
   const std::size_t own = now_.history.size();
-  return loaded_ && same_bits(s.q.data(), now_.q.data(), now_.X.size()) &&
-         same_bits(s.p.data(), now_.p.data(), now_.X.size()) &&
-         same_bits(s.qd.data(), now_.qd.data(), now_.X.size()) &&
-         same_bits(s.history.data(), now_.history.data(), own) &&
-         same_bits(s.history.data() + own, ledger, Ledger::kSize);
+  return loaded_ && same(now_.q, s.q) && same(now_.p, s.p) && same(now_.qd, s.qd) &&
+         std::memcmp(s.history.data(), now_.history.data(), own * sizeof(double)) == 0 &&
+         s.history[own] == ledger_.made_up && s.history[own + 1] == ledger_.exchanged;
 }
 
-/// A node computed by the last step is kept: place() and move_...() are functions of what State holds, so a
-/// state that was saved and loaded gives the same bits.
+/// Makes `now` the node of `s`.  False when its sizes do not fit or a number is not finite: what comes from
+/// outside is not trusted.  A node computed by the last step is kept: place() and move_...() are functions of
+/// what State holds, so a state that was saved and loaded gives the same bits.
 template <class G>
 bool Marcher<G>::load(const State& s) noexcept {
   if (!fits(s)) return false;
@@ -182,8 +184,9 @@ StepReport Marcher<G>::march(const Load<G>& load) noexcept {
 }
 
 template <class G>
-StepReport Marcher<G>::step(State& s, const Load<G>& load) noexcept {
-  const StepReport report = march(load);
+StepReport Marcher<G>::step(State& s, const Load<G>& acting) noexcept {
+  if (!load(s)) return {};
+  const StepReport report = march(acting);
   if (report.usable()) store(s);
   return report;
 }

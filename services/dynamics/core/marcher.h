@@ -21,11 +21,9 @@ class Marcher {
   Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier);
 
   State start(const VectorXd& q0, const VectorXd& qd0) const;
-  /// Makes `now` the node of `s`.  False when its sizes do not fit or a number is not finite: what comes from
-  /// outside is not trusted.
-  bool load(const State& s) noexcept;
-  /// Integrator::step() for the state that was loaded.
+  /// Integrator::step(), torques cut already.
   StepReport step(State& s, const Load<G>& load) noexcept;
+  /// Not a number for a state that is none.
   double energy(const State& s) noexcept;
   /// The chain has got other inertias: p follows from q and qd.
   void reweigh(State& s) noexcept;
@@ -33,6 +31,7 @@ class Marcher {
   void between(const State& before, const State& after, double share, VectorXd& q, VectorXd& qd) noexcept;
 
  private:
+  bool load(const State& s) noexcept;
   bool fits(const State& s) const noexcept;
   bool holds(const State& s) const noexcept;
   bool acceptable(const State& s) const noexcept;
