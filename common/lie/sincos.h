@@ -14,23 +14,19 @@ namespace hamel::lie {
 /// Angles up to this are reduced here [rad].
 inline constexpr double kReducible = 1.6e6;
 
-/// sin r and cos r for |r| <= pi/4.
+/// sin r and cos r for |r| <= pi/4.  Polynomials by pairs of terms: half as deep as term by term.
 template <class S>
 [[gnu::always_inline]] inline void sincos_kernel(const S& r, S& s, S& c) noexcept {
-  const S z = r * r;
-  const S sine = -1.66666666666666324348e-01 +
-                 z * (8.33333333332248946124e-03 +
-                      z * (-1.98412698298579493134e-04 +
-                           z * (2.75573137070700676789e-06 +
-                                z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))));
-  const S cosine = 4.16666666666666019037e-02 +
-                   z * (-1.38888888888741095749e-03 +
-                        z * (2.48015872894767294178e-05 +
-                             z * (-2.75573143513906633035e-07 +
-                                  z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))));
+  const S z = r * r, zz = z * z;
+  const S sine = (-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03) +
+                 zz * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06) +
+                       zz * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10));
+  const S cosine = (4.16666666666666019037e-02 + z * -1.38888888888741095749e-03) +
+                   zz * ((2.48015872894767294178e-05 + z * -2.75573143513906633035e-07) +
+                         zz * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11));
   s = r + r * z * sine;
   const S half = 0.5 * z, w = 1.0 - half;
-  c = w + ((1.0 - w - half) + z * z * cosine);
+  c = w + ((1.0 - w - half) + zz * cosine);
 }
 /// x - k pi/2 for an integer k below 2^20: the first two products are exact.
 template <class S>

@@ -12,13 +12,13 @@ namespace hamel::rbd {
 /// What one joint keeps of the articulated-body factorisation.
 template <class G, class S>
 struct Factor {
-  typename G::template Motion<S> W;  ///< I^A A / D, D = A^T I^A A + armature + extra
+  typename G::template Motion<S> W;  ///< X^T I^A A / D, D = A^T I^A A + armature + extra; none for the first
   S D_inv{};                         ///< 1 / D
 };
-template <class S>
-using JointFactor = Factor<SE3, S>;
 
 /// Articulated-body factorisation of M(q) + diag(extra), O(n).  `extra` may be null.
+/// The parent sees X^T (I^A - U U^T / D) X, U = I^A A, as X^T I^A X - (X^T U)(X^T U)^T / D: nothing but the
+/// last product waits for the division.
 template <class G, class S>
 [[gnu::always_inline]] inline void factorise(const typename G::Chain& chain,
                                              const typename G::template Frame<S>* X, const S* extra,
@@ -27,12 +27,14 @@ template <class G, class S>
   for (int i = chain.n(); i-- > 0;) {
     const auto& k = chain[i];
     add_rigid(k, X[i], I);
-    const auto U = joint_column(k, X[i], I);
+    auto U = joint_column(k, X[i], I);
     S D = along(k, X[i], U) + k.armature;
     if (extra) D = D + extra[i];
     f[i].D_inv = 1.0 / D;
+    if (i == 0) break;
+    U = to_parent(X[i], U);
     f[i].W = f[i].D_inv * U;
-    if (i > 0) I = to_parent(X[i], deflate(I, f[i].W, U));
+    I = deflate(to_parent(X[i], I), f[i].W, U);
   }
 }
 /// x = (M + diag(extra))^-1 (b - A^T W) from the factorisation, O(n), where W_i is the sum of the wrenches
@@ -48,14 +50,13 @@ template <class G, class S>
     if (wrench) p = p + wrench[i];
     const S y = b[i] - along(k, X[i], p);
     u[i] = y * f[i].D_inv;
-    if (i > 0) p = to_parent(X[i], p + y * f[i].W);
+    if (i > 0) p = to_parent(X[i], p) + y * f[i].W;
   }
   typename G::template Motion<S> a{};
   for (int i = 0; i < chain.n(); ++i) {
-    const auto& k = chain[i];
+    x[i] = i > 0 ? u[i] - dot(f[i].W, a) : u[i];
     if (i > 0) a = to_child(X[i], a);
-    x[i] = u[i] - dot(f[i].W, a);
-    add_along(k, X[i], a, x[i]);
+    add_along(chain[i], X[i], a, x[i]);
   }
 }
 

@@ -5,13 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "services/dynamics/core/node.h"
+
 namespace hamel::dynamics {
 namespace {
 
-template <class I>
-std::size_t at(I i) {
-  return static_cast<std::size_t>(i);
-}
 using Real = long double;
 
 /// Legendre polynomial P_s and its slope at x in (-1, 1).

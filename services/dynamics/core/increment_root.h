@@ -7,17 +7,18 @@
 #include <cmath>
 #include <limits>
 
+#include "common/lie/pack.h"
 #include "services/dynamics/core/node.h"
 #include "services/dynamics/core/tier.h"
 
 namespace hamel::dynamics {
 
 /// The past of an iteration, as it lies in State::history:
-///   [count, h, rate, d, its backward differences of order 1 .. kDepth - 1 (n each)].
+///   [count, h, rate, then of each joint d and its backward differences of order 1 .. kDepth - 1].
 /// It serves only steps of the same length h.
 class IncrementHistory {
  public:
-  static constexpr int kDepth = 7;
+  static constexpr int kDepth = 8;
   static std::size_t size(int n) noexcept { return kHead + static_cast<std::size_t>(kDepth * n); }
 
   /// First guess of the increment d: h qd while there is no past, else the polynomial through the last
@@ -34,18 +35,26 @@ class IncrementHistory {
     if (count < 2) {
       for (Eigen::Index i = 0; i < n; ++i) d[i] = h * qd[i];
       if (count == 0) return;
-      for (Eigen::Index i = 0; i < n; ++i) d[i] = 2 * d[i] - difference[i];  // h qd lies between the two
+      for (Eigen::Index i = 0; i < n; ++i)
+        d[i] = 2 * d[i] - difference[kDepth * i];  // h qd lies between the two
       return;
     }
-    std::array<double, kDepth> size{};
+    std::array<double, kDepth> size{}, taken{};
     for (Eigen::Index i = 0; i < n; ++i)
-      for (int order = 0; order < kDepth; ++order) size[at(order)] += std::abs(difference[order * n + i]);
+      for (int order = 0; order < kDepth; ++order)
+        size[at(order)] += std::abs(difference[kDepth * i + order]);
+    // What is left out is the error; as long as the past is short, its start may be in the differences.
+    const double fall = count < kDepth ? 0.5 : 1;
     int orders = 1;
-    while (orders < count && size[at(orders)] < 0.5 * size[at(orders - 1)]) ++orders;
+    while (orders < count && size[at(orders)] < fall * size[at(orders - 1)]) ++orders;
+    if (count == kDepth && orders < count) orders = std::max(orders - 1, 1);
+    std::fill_n(taken.begin(), orders, 1.0);
+    using Pair = lie::Pack<2, lie::Baseline>;
     for (Eigen::Index i = 0; i < n; ++i) {
-      double sum = 0;
-      for (int order = orders; order-- > 0;) sum += difference[order * n + i];
-      d[i] = sum;
+      Pair sum;
+      for (int order = 0; order < kDepth; order += 2)
+        sum += Pair::load(&taken[at(order)]) * Pair::load(&difference[kDepth * i + order]);
+      d[i] = sum.v[0] + sum.v[1];
     }
   }
   /// Share of the residual that an update left when it was last seen; 0: not known.
@@ -67,14 +76,13 @@ class IncrementHistory {
     for (Eigen::Index i = 0; i < n; ++i) {
       double x = d[i];
       for (int order = 0; order < kDepth; ++order) {
-        next[order * n + i] = x;
-        x -= last[order * n + i];
+        next[kDepth * i + order] = x;
+        x -= last[kDepth * i + order];
       }
     }
   }
 
  private:
-  static std::size_t at(int order) noexcept { return static_cast<std::size_t>(order); }
   static constexpr std::size_t kHead = 3;
 };
 
@@ -111,6 +119,8 @@ class Contraction {
       known_ = known_ || seen_ > 0;
       seen_ = std::max(seen_, relative / last_);
       rate_ = std::max(rate_, seen_);
+    } else if (last_ > 0) {
+      bound_ = std::max(bound_, relative / last_);
     }
     last_ = relative;
   }
@@ -122,6 +132,8 @@ class Contraction {
   double rate() const noexcept { return rate_; }
   /// The largest in this step; 0: none was seen.
   double seen() const noexcept { return seen_; }
+  /// The same where rounding hides it: it was no more; 0: nothing is known.
+  double bound() const noexcept { return bound_; }
   bool done() const noexcept { return within(1); }
   /// So many roundings from the end.
   bool within(double roundings) const noexcept { return last_ <= roundings * rounding_; }
@@ -129,12 +141,11 @@ class Contraction {
   bool ends_next() const noexcept {
     return known_ && rate_ > 0 && rate_ < 1 && last_ * std::max(rate_, least_) <= rounding_;
   }
-  /// Updates still needed at this rate, `most` at most; 1 when it is not known.
-  int updates_left(int most) const noexcept {
-    if (rate_ == 0) return 1;
-    int updates = 0;
-    for (double r = last_; r > rounding_ && updates < most; ++updates) r *= rate_;
-    return updates;
+  /// At this rate so many updates are needed, or more; false when it is not known.
+  bool needs(int updates) const noexcept {
+    double left = last_;
+    for (int k = 1; k < updates; ++k) left *= rate_;
+    return rate_ > 0 && left > rounding_;
   }
 
  private:
@@ -142,7 +153,7 @@ class Contraction {
   /// No update is trusted to leave less, for motion changes from step to step; and the momentum handed on is
   /// that of the last evaluation, which must not be far from the root.
   static constexpr double kLeast = 1e-3;
-  double rounding_, rate_, seen_ = 0, last_ = 0, least_ = kLeast;
+  double rounding_, rate_, seen_ = 0, bound_ = 0, last_ = 0, least_ = kLeast;
   bool known_;
 };
 

@@ -84,11 +84,13 @@ template <class G>
 class Arm final : public Integrator::Impl {
  public:
   Arm(const model::Chain& c, const Options& o)
-      : Impl(c, o), axis_(c), load_(axis_.n()), marcher_(axis_, options, make_tier<G>(axis_, options)) {}
+      : Impl(c, o), axis_(c), load_(axis_.n()), marcher_(axis_, options, make_tier<G>(axis_, options)) {
+    for (int i = 0; i < axis_.n(); ++i) limits_.push_back(chain.joint(i).limits);
+  }
 
   State start(const VectorXd& q0, const VectorXd& qd0) const override { return marcher_.start(q0, qd0); }
   StepReport step(State& state, const VectorXd& tau) noexcept override {
-    if (!marcher_.acceptable(state) || tau.size() != axis_.n() || !all_finite(tau)) return {};
+    if (tau.size() != axis_.n() || !all_finite(tau)) return {};
     const int saturated = cut(tau);
     StepReport report = marcher_.step(state, load_);
     report.saturated = saturated;
@@ -120,7 +122,7 @@ class Arm final : public Integrator::Impl {
   int cut(const VectorXd& tau) noexcept {
     int count = 0;
     for (int i = 0; i < axis_.n(); ++i) {
-      const double effort = chain.joint(i).limits.effort;
+      const double effort = limits_[at(i)].effort;
       load_.tau[i] = std::clamp(tau[i], -effort, effort);
       count += load_.tau[i] != tau[i];
     }
@@ -129,13 +131,14 @@ class Arm final : public Integrator::Impl {
   int outside(const State& s) const noexcept {
     int count = 0;
     for (int i = 0; i < axis_.n(); ++i) {
-      const model::JointLimits& limits = chain.joint(i).limits;
+      const model::JointLimits& limits = limits_[at(i)];
       count += s.q[i] < limits.lower || s.q[i] > limits.upper || std::abs(s.qd[i]) > limits.velocity;
     }
     return count;
   }
 
   typename G::Chain axis_;
+  std::vector<model::JointLimits> limits_;
   Load<G> load_;
   Marcher<G> marcher_;
 };

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <utility>
 
 #include "services/dynamics/core/rounding.h"
@@ -14,6 +16,14 @@ constexpr double kEnergyBound = 0.1;
 /// The same over all steps: up to kDrift nobody asks; then a part may add kTrickle at most, and up to
 /// kDriftLimit.
 constexpr double kDrift = 0.25, kDriftLimit = 0.5, kTrickle = 1e-3;
+
+/// Number by number: wider loads would wait for stores of the last step that are still under way.
+bool same(const VectorXd& a, const VectorXd& b) noexcept {
+  const double *x = a.data(), *y = b.data();
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (x[i] != y[i]) return false;
+  return true;
+}
 
 }  // namespace
 
@@ -43,28 +53,44 @@ State Marcher<G>::start(const VectorXd& q0, const VectorXd& qd0) const {
 }
 
 template <class G>
-bool Marcher<G>::acceptable(const State& s) const noexcept {
+bool Marcher<G>::fits(const State& s) const noexcept {
   const auto n = chain_.n();
   return s.q.size() == n && s.p.size() == n && s.qd.size() == n &&
-         s.history.size() == now_.history.size() + Ledger::kSize && all_finite(s.q) && all_finite(s.p) &&
-         all_finite(s.qd) && all_finite(s.history);
+         s.history.size() == now_.history.size() + Ledger::kSize;
 }
 
-/// Makes `now` the node of `s`.  A node computed by the last step is kept: place() and move_...() are
-/// functions of what State holds, so a state that was saved and loaded gives the same bits.
 template <class G>
-void Marcher<G>::load_state(const State& s) noexcept {
+bool Marcher<G>::acceptable(const State& s) const noexcept {
+  return fits(s) && all_finite(s.q) && all_finite(s.p) && all_finite(s.qd) && all_finite(s.history);
+}
+
+/// True when `s` is what `now` was stored to.
+template <class G>
+bool Marcher<G>::holds(const State& s) const noexcept {
+  const std::size_t own = now_.history.size();
+  return loaded_ && same(now_.q, s.q) && same(now_.p, s.p) && same(now_.qd, s.qd) &&
+         std::memcmp(s.history.data(), now_.history.data(), own * sizeof(double)) == 0 &&
+         s.history[own] == ledger_.made_up && s.history[own + 1] == ledger_.exchanged;
+}
+
+/// Makes `now` the node of `s`.  False when its sizes do not fit or a number is not finite: what comes from
+/// outside is not trusted.  A node computed by the last step is kept: place() and move_...() are functions of
+/// what State holds, so a state that was saved and loaded gives the same bits.
+template <class G>
+bool Marcher<G>::load(const State& s) noexcept {
+  if (!fits(s)) return false;
+  if (holds(s)) return true;
+  if (!acceptable(s)) return false;
   const std::size_t own = now_.history.size();
   std::copy_n(s.history.begin(), own, now_.history.begin());
   ledger_ = {s.history[own], s.history[own + 1]};
-  if (loaded_ && now_.q == s.q && now_.p == s.p && now_.qd == s.qd) return;
   now_.place(chain_, s.q);
   if (tier_->integrates_velocity()) {
     now_.move_with_velocity(chain_, s.qd);
   } else {
     now_.move_with_momentum(chain_, s.p);
   }
-  loaded_ = true;
+  return loaded_ = true;
 }
 
 template <class G>
@@ -80,15 +106,17 @@ void Marcher<G>::store(State& s) const noexcept {
 /// and against drift.
 template <class G>
 bool Marcher<G>::sane(const StepReport& report, const Load<G>& load, double h) const noexcept {
-  if (!next_.finite()) return false;
   const double bound = tier_->turn_bound(), *q = now_.q.data(), *qd = now_.qd.data(),
-               *q_next = next_.q.data(), *tau = load.tau.data();
-  double work = std::abs(report.work_J);
+               *q_next = next_.q.data(), *p_next = next_.p.data(), *qd_next = next_.qd.data(),
+               *tau = load.tau.data();
+  double work = std::abs(report.work_J), poison = 0;
   for (int i = 0; i < chain_.n(); ++i) {
     const double d = q_next[i] - q[i];
+    poison += 0 * q_next[i] + 0 * p_next[i] + 0 * qd_next[i];
     if (!chain_[i].prismatic && std::abs(d - h * qd[i]) > bound) return false;
     work += std::abs(tau[i] * d);
   }
+  if (poison != 0) return false;
   const double in_play = now_.energy_J - now_.potential_J + work + chain_.energy_scale + kNothing;
   const double made_up = next_.energy_J - now_.energy_J - report.work_J;
   if (!std::isfinite(in_play) || !std::isfinite(made_up)) return false;
@@ -156,17 +184,16 @@ StepReport Marcher<G>::march(const Load<G>& load) noexcept {
 }
 
 template <class G>
-StepReport Marcher<G>::step(State& s, const Load<G>& load) noexcept {
-  load_state(s);
-  const StepReport report = march(load);
+StepReport Marcher<G>::step(State& s, const Load<G>& acting) noexcept {
+  if (!load(s)) return {};
+  const StepReport report = march(acting);
   if (report.usable()) store(s);
   return report;
 }
 
 template <class G>
 double Marcher<G>::energy(const State& s) noexcept {
-  load_state(s);
-  return now_.energy_J;
+  return load(s) ? now_.energy_J : std::numeric_limits<double>::quiet_NaN();
 }
 
 template <class G>

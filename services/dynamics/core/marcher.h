@@ -21,10 +21,9 @@ class Marcher {
   Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier);
 
   State start(const VectorXd& q0, const VectorXd& qd0) const;
-  /// Sizes fit and every number is finite: what comes from outside is not trusted.
-  bool acceptable(const State& s) const noexcept;
-  /// Integrator::step() for an acceptable state.
+  /// Integrator::step(), torques cut already.
   StepReport step(State& s, const Load<G>& load) noexcept;
+  /// Not a number for a state that is none.
   double energy(const State& s) noexcept;
   /// The chain has got other inertias: p follows from q and qd.
   void reweigh(State& s) noexcept;
@@ -32,7 +31,10 @@ class Marcher {
   void between(const State& before, const State& after, double share, VectorXd& q, VectorXd& qd) noexcept;
 
  private:
-  void load_state(const State& s) noexcept;
+  bool load(const State& s) noexcept;
+  bool fits(const State& s) const noexcept;
+  bool holds(const State& s) const noexcept;
+  bool acceptable(const State& s) const noexcept;
   void store(State& s) const noexcept;
   bool sane(const StepReport& report, const Load<G>& load, double h) const noexcept;
   bool allowed(double made_up, double in_play) const noexcept;

@@ -34,6 +34,7 @@ template <class G>
 MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
     : chain_(chain),
       options_(options),
+      gravity_(std::sqrt(dot(chain.gravity_W, chain.gravity_W))),
       contraction_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
       r_(d_),
@@ -45,10 +46,7 @@ MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
       X_factor_(at(chain.n())),
       own_factor_(at(chain.n())),
       V_(at(chain.n())),
-      momentum_(at(chain.n())),
-      H_(at(chain.n())),
       g_(at(chain.n())),
-      moment_(at(chain.n())),
       push_(chain.n()),
       newton_(chain) {
   brakes_ = options.stop_stiffness > 0;
@@ -73,8 +71,8 @@ StepReport MidpointStep<G>::advance(const Node<G>& from, const Load<G>& load, do
   if (!report.usable()) return report;
   report.work_J = work(d_.data());
   IncrementHistory::push(from, h, remembered_rate(), d_, to);
-  u_ = from.q + d_;
-  to.place(chain_, u_);
+  to.q = from.q + d_;
+  to.place(chain_, to.q);
   to.move_with_momentum(chain_, p_next_);
   return report;
 }
@@ -84,10 +82,9 @@ template <class G>
 double MidpointStep<G>::work(const double* d) const noexcept {
   const double *q = from_->q.data(), *tau = load_->tau.data(), *pushed = push_.data();
   double sum = 0;
-  for (int i = 0; i < chain_.n(); ++i)
-    sum += (tau[i] + pushed[i] +
-            resistance(chain_[i], d[i] * rate_, options_.stop_stiffness, q[i] + 0.5 * d[i])) *
-           d[i];
+  for (int i = 0; i < chain_.n(); ++i) sum += (tau[i] + pushed[i]) * d[i];
+  for (int i = 0; brakes_ && i < chain_.n(); ++i)
+    sum += resistance(chain_[i], d[i] * rate_, options_.stop_stiffness, q[i] + 0.5 * d[i]) * d[i];
   return sum;
 }
 
@@ -111,17 +108,18 @@ void MidpointStep<G>::choose_factorisation(const VectorXd& d) noexcept {
 
 template <class G>
 void MidpointStep<G>::forward(const double* d) noexcept {
-  u_ = from_->q + 0.5 * Eigen::Map<const VectorXd>(d, chain_.n());
+  const double* q = from_->q.data();
+  double* u = u_.data();
+  for (int i = 0; i < chain_.n(); ++i) u[i] = q[i] + 0.5 * d[i];
   rbd::place(chain_, u_.data(), X_.data());
-  typename G::template Motion<double> V;
-  auto g = chain_.gravity_W;
+  Motion V;
+  Direction g = chain_.gravity_W;
   const double rate = rate_;
   for (int i = 0; i < chain_.n(); ++i) {
     const auto& X = X_[at(i)];
     V = to_child(X, V);
     add_along(chain_[i], X, V, d[i] * rate);
     V_[at(i)] = V;
-    momentum_[at(i)] = momentum(chain_[i], X, V);
     g_[at(i)] = g = turn_to_child(X, g);
   }
 }
@@ -129,9 +127,8 @@ void MidpointStep<G>::forward(const double* d) noexcept {
 /// The torque over the step: commanded, damping by the mean rate, wrenches and stops at the midpoint.
 template <class G>
 Residual MidpointStep<G>::backward(const double* d) noexcept {
-  typename G::template Motion<double> H;  // composite momentum
-  typename G::template Direction<double>
-      moment;  // composite first moment of mass: w_i = (moment x g, mass g)
+  Motion H;          // composite momentum
+  Direction moment;  // composite first moment of mass: w_i = (moment x g, mass g)
   MomentumParts parts;
   // plain pointers and numbers of its own: this is where the time goes
   const double h = h_, half = 0.5 * h_, rate = rate_, stiffness = options_.stop_stiffness;
@@ -143,17 +140,16 @@ Residual MidpointStep<G>::backward(const double* d) noexcept {
   for (int i = chain_.n(); i-- > 0;) {
     const auto& k = chain_[i];
     const auto& X = X_[at(i)];
-    H = H + momentum_[at(i)];
+    const Motion& V = V_[at(i)];
+    H = H + momentum(k, X, V);
     add_moment(k, X, moment);
-    H_[at(i)] = H;
-    moment_[at(i)] = moment;
     const double force = tau[i] + pushed[i] + resistance(k, d[i] * rate, stiffness, q[i] + 0.5 * d[i]);
     const double rotor = k.armature * d[i] * rate, push = half * force;
-    const double turn = half * (coadjoint_along(k, X, V_[at(i)], H) + weight_along(k, X, moment, g_[at(i)]));
+    const double turn = half * (coadjoint_along(k, X, V, H) + weight_along(k, X, moment, g_[at(i)]));
     r[i] = along(k, X, H) + rotor - turn - p[i] - push;
     p_next[i] = p[i] + 2 * (turn + push);
     if (rescale) {
-      parts.add(k, V_[at(i)]);
+      parts.add(k, V);
       scale_inv[i] = 1 / (std::abs(p[i]) + parts.along(k) + std::abs(rotor) + std::abs(turn) +
                           std::abs(push) + h * (k.weight + quiet) + kNothing);
       parts.shift(X.p);
@@ -182,8 +178,7 @@ template <class G>
 bool MidpointStep<G>::newton_pays() const noexcept {
   return options_.root == Root::newton ||
          (options_.root == Root::adaptive &&
-          (linearised_ ||
-           (contraction_.rate() < kResolved && contraction_.updates_left(kWorthNewton) == kWorthNewton)));
+          (linearised_ || (contraction_.rate() < kResolved && contraction_.needs(kWorthNewton))));
 }
 
 /// Eq. (16): d <- d - h M^-1 r.  Newton: the exact Jacobian, made anew where the last one gains too
@@ -196,7 +191,7 @@ void MidpointStep<G>::correct(VectorXd& d) noexcept {
     return;
   }
   if (!linearised_ || contraction_.rate() > kStale) {
-    linearise(d);
+    linearise();
     feedback_rate_ = std::max(feedback_rate_, linearised_ ? 0 : contraction_.seen());
     contraction_.sharpen();
   }
@@ -212,8 +207,9 @@ double MidpointStep<G>::remembered_rate() const noexcept {
   const double before = IncrementHistory::rate(*from_, h_);
   if (linearised_ && options_.root == Root::adaptive)
     return feedback_rate_ > 0 ? feedback_rate_ : kForget * before;
-  const double seen = contraction_.seen();
-  return std::min(1.0, seen > 0 ? std::max(seen, kForget * before) : kAge * before);
+  const double seen = contraction_.seen(), bound = contraction_.bound();
+  if (seen > 0) return std::min(1.0, std::max(seen, kForget * before));
+  return std::min(bound > 0 ? bound : 1.0, kAge * before);
 }
 
 template class MidpointStep<SE3>;

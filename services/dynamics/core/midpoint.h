@@ -22,11 +22,13 @@ template <class G>
 class MidpointStep final : public TierStep<G> {
  public:
   using Chain = typename G::Chain;
+  using Motion = typename G::template Motion<double>;
+  using Direction = typename G::template Direction<double>;
+  using Matrix = typename ChainNewton<G>::Matrix;
   MidpointStep(const Chain& chain, const Options& options);
   std::size_t history_size() const noexcept override { return IncrementHistory::size(chain_.n()); }
   bool keeps_energy() const noexcept override { return true; }
   double turn_bound() const noexcept override { return kTurnBound; }
-  using Matrix = typename ChainNewton<G>::Matrix;
   StepReport advance(const Node<G>& from, const Load<G>& load, double h, Node<G>& to) noexcept override;
 
   /// The step that evaluate() and correct() are about.
@@ -37,21 +39,23 @@ class MidpointStep final : public TierStep<G> {
   /// d <- d - J^-1 r: Eq. (16) with M^-1 by the factorisation, or Newton.
   void correct(VectorXd& d) noexcept;
   /// Exact Jacobian at the last evaluate(), and x with J x = r.
-  void linearise(const VectorXd& d) noexcept;
+  void linearise() noexcept;
   void solve_linear(const VectorXd& r, VectorXd& x) noexcept { newton_.solve(r.data(), x.data()); }
 
  private:
   void choose_factorisation(const VectorXd& d) noexcept;
   void forward(const double* d) noexcept;
   Residual backward(const double* d) noexcept;
-  JointRow<G> row(int i, double d, const typename G::template Attitude<double>& R, Matrix& P) const noexcept;
+  JointRow<G> row(int i, const typename G::template Attitude<double>& R, const Motion& H,
+                  const Direction& moment, Matrix& P) const noexcept;
   bool newton_pays() const noexcept;
   double remembered_rate() const noexcept;
   double work(const double* d) const noexcept;
-  double diagonal(int i, double d) const noexcept;
+  double diagonal(int i) const noexcept;
 
   const Chain& chain_;
   const Options options_;
+  const double gravity_;  ///< its strength [m/s^2]
   // the step being solved
   const Node<G>* from_ = nullptr;
   const Load<G>* load_ = nullptr;
@@ -63,8 +67,8 @@ class MidpointStep final : public TierStep<G> {
   VectorXd d_, r_, p_next_, scale_inv_, extra_, u_;  ///< scale_inv_: 1 / what a residual is measured by
   Frames<G> X_, X_factor_;
   Factors<G> own_factor_;
-  Motions<G> V_, momentum_, H_;
-  std::vector<typename G::template Direction<double>> g_, moment_;
+  Motions<G> V_;
+  std::vector<Direction> g_;
   Push<G> push_;
   bool rescale_ = true, brakes_ = false;  ///< brakes_: damping or stops
   // Newton: the factorisation serves while it converges fast

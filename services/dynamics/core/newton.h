@@ -15,6 +15,7 @@
 #include <array>
 #include <vector>
 
+#include "common/lie/pack.h"
 #include "common/rbd/sweeps.h"
 
 namespace hamel::dynamics {
@@ -22,8 +23,34 @@ namespace hamel::dynamics {
 using rbd::SE2;
 using rbd::SE3;
 
+using Pair = lie::Pack<2, lie::Baseline>;
+
+/// N numbers, two by two; the last one of an odd N beside zero.
 template <int N>
-using Column = std::array<double, static_cast<std::size_t>(N)>;
+struct Column {
+  static constexpr std::size_t kSize = N, kPairs = (N + 1) / 2;
+  std::array<Pair, kPairs> v{};
+  [[gnu::always_inline]] double operator[](std::size_t i) const { return v[i / 2].v[i % 2]; }
+  [[gnu::always_inline]] void add(std::size_t i, double x) { v[i / 2].v[i % 2] += x; }
+};
+/// x + s y.
+template <int N>
+[[gnu::always_inline]] inline Column<N> plus(Column<N> x, double s, const Column<N>& y) {
+  for (std::size_t i = 0; i < x.kPairs; ++i) x.v[i] += s * y.v[i];
+  return x;
+}
+/// x . y = its first number plus its second: two rows' are added at once.
+template <int N>
+[[gnu::always_inline]] inline Pair halves(const Column<N>& x, const Column<N>& y) {
+  Pair sum = x.v[0] * y.v[0];
+  for (std::size_t i = 1; i < x.kPairs; ++i) sum += x.v[i] * y.v[i];
+  return sum;
+}
+template <int N>
+[[gnu::always_inline]] inline double dot(const Column<N>& x, const Column<N>& y) {
+  const Pair sum = halves(x, y);
+  return sum.v[0] + sum.v[1];
+}
 
 /// The linearised equation of one joint.
 template <int Changes, int Carries>
@@ -31,8 +58,8 @@ struct Linear {
   using Change = Column<Changes>;                           ///< S
   using Carried = Column<Carries>;                          ///< Z
   using Matrix = std::array<Change, std::size_t{Carries}>;  ///< P, row by row
-  Change b{}, k{};
-  Carried e{}, l{};
+  Change b, k;
+  Carried e, l;
   double c = 0;
 };
 template <class G>
@@ -72,7 +99,7 @@ class ChainNewton {
 
  private:
   struct JointFactor {
-    typename Row::Change b, u;
+    typename Row::Change b, u;  ///< u, v: as the parent sees them
     typename Row::Carried l, v;
     typename Row::Lever p;  ///< from the parent's origin to this one
     double D_inv = 0;

@@ -64,11 +64,6 @@ void Node<G>::move_with_velocity(const Chain& chain, const VectorXd& qd_new) noe
   energy_J = 0.5 * p.dot(qd) + potential_J;
 }
 
-template <class G>
-bool Node<G>::finite() const noexcept {
-  return std::isfinite(energy_J) && all_finite(q) && all_finite(p) && all_finite(qd);
-}
-
 template struct Node<SE3>;
 template struct Node<SE2>;
 

@@ -42,8 +42,6 @@ struct Node {
   void move_with_momentum(const Chain& chain, const VectorXd& p_new) noexcept;
   /// p = M qd and the energy.
   void move_with_velocity(const Chain& chain, const VectorXd& qd_new) noexcept;
-  /// True when every number of the state is finite.
-  bool finite() const noexcept;
 
   VectorXd q, p, qd;
   std::vector<double> history;  ///< the tier's own

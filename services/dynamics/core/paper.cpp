@@ -104,13 +104,13 @@ Residual PaperStep<G>::evaluate(const VectorXd& d) noexcept {
 
 namespace {
 /// The change of a link's momentum with its twist, column by column of unit twists.
-template <int N, class Unit, class Column, class Matrix>
-void add_columns(const Unit& unit, const Column& column, Matrix& P) {
+template <int N, class Unit, class Momentum, class Matrix>
+void add_columns(const Unit& unit, const Momentum& momentum_of, Matrix& P) {
   for (std::size_t c = 0; c < std::size_t{N}; ++c) {
     std::array<double, std::size_t{N}> one{};
     one[c] = 1;
-    const std::array<double, std::size_t{N}> out = column(unit(one));
-    for (std::size_t r = 0; r < std::size_t{N}; ++r) P[r][c] += out[r];
+    const std::array<double, std::size_t{N}> out = momentum_of(unit(one));
+    for (std::size_t r = 0; r < std::size_t{N}; ++r) P[r].add(c, out[r]);
   }
 }
 }  // namespace
@@ -141,7 +141,7 @@ void PaperStep<SE3>::linearise() noexcept {
         P);
     const std::array<double, 6> axis = level(A);
     JointRow<SE3> j;
-    for (std::size_t c = 0; c < 6; ++c) j.l[c] = axis[c], j.b[c] = axis[c] / h_;
+    for (std::size_t c = 0; c < 6; ++c) j.l.add(c, axis[c]), j.b.add(c, axis[c] / h_);
     j.c = k.armature / h_ + 0.5 * k.damping;
     return j;
   });
@@ -165,8 +165,8 @@ void PaperStep<SE2>::linearise() noexcept {
         },
         P);
     JointRow<SE2> j;
-    j.l = {A.a, A.l.x, A.l.y, 0, 0};
-    j.b = {A.a / h_, A.l.x / h_, A.l.y / h_, 0};
+    j.l = {{Pair{{A.a, A.l.x}}, Pair{{A.l.y, 0}}}};
+    j.b = plus(j.b, 1 / h_, {{Pair{{A.a, A.l.x}}, Pair{{A.l.y, 0}}}});
     j.c = k.armature / h_ + 0.5 * k.damping;
     return j;
   });
