@@ -174,7 +174,7 @@ scene::Scene with(const scene::Scene& s, const scene::DynamicsOptions& o, int pe
   scene::Scene out = s;
   out.dynamics = o;
   out.planner.period_steps = period_steps;
-  out.planner.hurry_steps = 0;
+  out.hurry = {};
   return out;
 }
 

@@ -109,7 +109,7 @@ double closed_in(const scene::Scene& s, std::uint64_t steps) {
   for (const scene::ScriptedObstacle& o : s.perception.obstacles)
     obstacle_mps = std::max(
         obstacle_mps, o.velocity_mps.norm() + 2 * std::numbers::pi * o.frequency_hz * o.amplitude_m.norm());
-  const auto written = static_cast<std::uint64_t>(s.planner.hurry_steps);
+  const auto written = static_cast<std::uint64_t>(s.hurry.period_steps);
   rbd::Workspace before(chain), now(chain);
   std::uint64_t cycles = 0, last = 0;
   double most = 0;

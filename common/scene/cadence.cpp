@@ -7,8 +7,8 @@ namespace hamel::scene {
 
 Cadence::Cadence(const Scene& s)
     : period_(static_cast<std::uint64_t>(s.planner.period_steps)),
-      hurry_(static_cast<std::uint64_t>(s.planner.hurry_steps)),
-      hurry_mps_(s.planner.hurry_mps),
+      hurry_(static_cast<std::uint64_t>(s.hurry.period_steps)),
+      hurry_mps_(s.hurry.mps),
       chain_(s.robot.chain),
       ws_(chain_) {
   for (const LinkShape& shape : s.robot.shapes)

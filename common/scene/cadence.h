@@ -12,9 +12,9 @@
 namespace hamel::scene {
 
 /// Every PlannerOptions::period_steps-th step; where `cycle` made these fewer than written, also every
-/// hurry_steps-th at which a point of the arm is faster than hurry_mps.
+/// Hurry::period_steps-th at which a point of the arm is faster than Hurry::mps.
 ///
-/// So two cycles are farther apart than as written only while no point of the arm is faster than hurry_mps at
+/// So two cycles are farther apart than as written only while no point of the arm is faster than that at
 /// the start of any written period between them.  Depends on the state alone: whoever waits for a command and
 /// whoever computes it ask about the same state and agree.
 class Cadence {

@@ -47,10 +47,7 @@ enum class Unreachable : std::uint8_t { reject, approach };
 /// How the arm is steered.  Defaults are for a planar arm of unit links; scenes say their own.
 struct PlannerOptions {
   Method method = Method::gyro;
-  int period_steps = 1;  ///< a command every so many dynamics steps, >= 1
-  /// > 0: also every so many while a point of the arm is faster than hurry_mps (cadence.h).  Set by reduce().
-  int hurry_steps = 0;
-  double hurry_mps = kInf;
+  int period_steps = 1;              ///< a command every so many dynamics steps, >= 1
   double kp = 10;                    ///< attraction, Eq. (17) [1/s^2], > 0
   double kv = 6.3;                   ///< attraction, Eq. (17) [1/s], > 0
   double vmax_mps = kInf;            ///< target speed the attraction saturates at, > 0

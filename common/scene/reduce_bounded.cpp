@@ -103,15 +103,15 @@ void reduce_cycle(Scene& s) {
   const bool less = needed > before, on = less && s.reduce.cycle == Choice::on;
   if (on) {
     s.planner.period_steps = needed;
-    s.planner.hurry_steps = before;
-    s.planner.hurry_mps = kHurry * s.planner.vmax_mps;
+    s.hurry.period_steps = before;
+    s.hurry.mps = kHurry * s.planner.vmax_mps;
   }
   const std::string why =
       std::isinf(closing_mps) ? "no speed limits how fast the arm or an obstacle closes in"
       : !less                 ? "the arm's and the obstacles' speeds need one each " + number(needed_s) + " s"
       : on ? "nothing closes in by more than the bound between two; as often as written while a point of the "
              "arm is faster than " +
-                 number(s.planner.hurry_mps) + " m/s"
+                 number(s.hurry.mps) + " m/s"
            : "reduce { cycle: on } would; fidelity: fastest chooses the planner's period with the step";
   Reduction& r =
       note_bounded(s, "cycle", on, on ? "planner cycles less often" : "planner cycles as written", why);

@@ -121,6 +121,13 @@ struct Reduction {
   bool live = false;  ///< goes by what happens in the run, whatever its sizes at the start
 };
 
+/// Where the reduction `cycle` made a planner cycle longer than written: as often as written while the arm is
+/// fast (cadence.h).
+struct Hurry {
+  int period_steps = 0;  ///< as written; 0: no cycle was made longer
+  double mps = kInf;     ///< in force while a point of the arm is faster
+};
+
 /// One run.
 struct Scene {
   std::string name;
@@ -139,6 +146,7 @@ struct Scene {
   ReduceOptions reduce = {};
   Accuracy accuracy = {};
   std::vector<Lock> locked = {};
+  Hurry hurry = {};
   std::vector<Reduction> reductions = {};  ///< what reduce() did and did not; empty: the scene as written
 };
 

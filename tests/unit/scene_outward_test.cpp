@@ -192,12 +192,12 @@ TEST(Cycle, IsAsLongAsTheSpeedsAllow) {
     const double closes = (2 * s.planner.vmax_mps + fastest) * s.planner.period_steps * s.dynamics.dt_s;
     if (!r->in_force) {
       EXPECT_EQ(s.planner.period_steps, 1);
-      EXPECT_EQ(s.planner.hurry_steps, 0);
+      EXPECT_EQ(s.hurry.period_steps, 0);
       continue;
     }
     ++longer;
-    EXPECT_EQ(s.planner.hurry_steps, 1);
-    EXPECT_LT(s.planner.hurry_mps, 2 * s.planner.vmax_mps);
+    EXPECT_EQ(s.hurry.period_steps, 1);
+    EXPECT_LT(s.hurry.mps, 2 * s.planner.vmax_mps);
     EXPECT_NEAR(r->bound, closes, 1e-12);
     EXPECT_LE(closes, s.accuracy.obstacle_error_m * (1 + 1e-6));
     const bool longest = closes + (2 * s.planner.vmax_mps + fastest) * s.dynamics.dt_s >
@@ -227,8 +227,8 @@ TEST(Cycle, IsAsOftenAsWrittenWhileThePointsAreFast) {
     const Eigen::VectorXd q = rng.vector(n, 1);
     Eigen::VectorXd qd = rng.vector(n, 1), slow = qd;
     const double speed = cadence.fastest_mps(q, qd);
-    qd *= 1.001 * s.planner.hurry_mps / speed;
-    slow *= 0.999 * s.planner.hurry_mps / speed;
+    qd *= 1.001 * s.hurry.mps / speed;
+    slow *= 0.999 * s.hurry.mps / speed;
     for (std::uint64_t step = 0; step < 20; ++step) {
       EXPECT_EQ(cadence.due(step, q, qd), step % 2 == 0);
       EXPECT_EQ(cadence.due(step, q, slow), step % 6 == 0);
