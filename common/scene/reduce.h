@@ -35,8 +35,8 @@ namespace hamel::scene {
 ///              two that are farther apart than as written, and as often as written while a point of the arm
 ///              is faster than 1.5 times what the end effector is drawn with (cadence.h).  The bound is that
 ///              of twice that speed and of the scripted obstacles': it holds as long as no point of the arm
-///              becomes faster by more than the number of steps put together times that speed within one
-///              written period.  Only where it is `on`
+///              gains more speed in one written period than that speed times how many were put together.
+///              Only where it is `on`
 ///   step       bounded [rad]: named here, chosen by those who may run the scene (clients/hamel)
 void reduce(Scene& s);
 
