@@ -75,6 +75,16 @@ int goal(const GoalArgs& args) {
   if (!g.position_m.allFinite() || !g.orientation_xyzw.allFinite() || !g.joints.allFinite())
     return runtime::complain("hamel goal", {{"target", "every number must be finite"}});
 
+  if (!args.joints.empty()) {
+    wire::Subscription<wire::ArmState> states(n);
+    wire::ArmState s;
+    if (!wait_for(n, states, s, [&](const auto& m) { return m.arm == args.arm; }))
+      return nobody("goal", "arm", args.bus);
+    if (s.position.size() != g.joints.size())
+      return runtime::complain(
+          "hamel goal", {{"--joints", fmt::format("{} values, arm {} has {} joints", g.joints.size(), s.arm,
+                                                  s.position.size())}});
+  }
   wire::Publisher<wire::Goal> out(n);
   wire::Subscription<wire::PlannerReport> reports(n);
   wire::PlannerReport r;
@@ -82,8 +92,13 @@ int goal(const GoalArgs& args) {
     return nobody("goal", "planner", args.bus);
   g.id = r.goal_id + 1;
   if (!out.publish(g)) return runtime::complain("hamel goal", {{"goal", "the bus refused it"}});
-  if (!wait_for(n, reports, r, [&](const auto& m) { return m.arm == args.arm && m.goal_id >= g.id; }))
-    return nobody("goal", "planner", args.bus);
+  if (!wait_for(n, reports, r, [&](const auto& m) { return m.arm == args.arm && m.goal_id >= g.id; })) {
+    fmt::print(
+        stderr,
+        "hamel goal: the planner of arm {} speaks ({}) but has not confirmed goal {}; it may yet take it\n",
+        args.arm, wire::to_string(r.state), g.id);
+    return runtime::kNoData;
+  }
   fmt::print("goal {} taken by arm {}: {}{}{}\n", r.goal_id, r.arm, wire::to_string(r.state),
              r.reason == wire::Reason::none ? "" : std::string(" ") + wire::to_string(r.reason),
              r.detail.empty() ? "" : ", " + r.detail);
@@ -125,10 +140,12 @@ int mode(const ModeArgs& args) {
   // one.
   wire::PlannerReport r;
   const auto ours = [&](const auto& m) { return m.arm == args.arm; };
-  if (wait_for(n, reports, r, ours, kAnyPlanner) && r.mode_id < c.id &&
+  const bool steered = wait_for(n, reports, r, ours, kAnyPlanner);
+  if (steered && r.mode_id < c.id &&
       !wait_for(n, reports, r, [&](const auto& m) { return ours(m) && m.mode_id >= c.id; }))
     return nobody(args.mode.c_str(), "planner", args.bus);
-  fmt::print("arm {}: {} at t = {:.3f} s\n", s.arm, wire::to_string(s.validity), s.t_s);
+  fmt::print("arm {}: {} at t = {:.3f} s{}\n", s.arm, wire::to_string(s.validity), s.t_s,
+             steered ? "" : "; no planner is heard");
   return runtime::kDone;
 }
 

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <unordered_map>
@@ -146,7 +148,8 @@ int topic_echo(const TopicArgs& args) {
   const auto deadline = Clock::now() + runtime::seconds(args.seconds);
   bus::Payload p;
   std::uint64_t shown = 0;
-  while (!stop.requested() && (args.count == 0 || shown < args.count)) {
+  int written = 0;
+  while (written == 0 && !stop.requested() && (args.count == 0 || shown < args.count)) {
     if (!reader->take(p)) {
       if (shown == 0 && Clock::now() > deadline) break;
       n.wait(Clock::now() + 100ms);
@@ -166,9 +169,11 @@ int topic_echo(const TopicArgs& args) {
       for (const auto& f : fields.value()) fmt::print("{}: {}\n", f.path, show(f));
       fmt::print("---\n");
     }
-    std::fflush(stdout);
+    if (std::fflush(stdout) != 0) written = errno;
   }
   stop.on_stop({});
+  if (written != 0 && written != EPIPE)
+    return runtime::complain("hamel topic echo", {{"standard output", std::strerror(written)}});
   if (shown > 0) return runtime::kDone;
   fmt::print(stderr, "hamel topic echo: nothing on {} within {} s on domain {}\n", topic->name, args.seconds,
              args.bus.domain);

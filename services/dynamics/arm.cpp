@@ -68,9 +68,9 @@ void Arm::drive_torque(const Drive& drive) noexcept {
   }
 }
 
-/// A brake until the arm has come to rest, then critically damped about that place, M qdd = -(b/2)^2 M (q -
-/// q_hold)
-/// - b p: about where holding began, it would swing back to what it came from.
+/// A brake until the arm has come to rest, then critically damped about that place:
+///   M qdd = -(b/2)^2 M (q - q_hold) - b p.
+/// About where holding began, it would swing back to what it came from.
 void Arm::hold_torque() noexcept {
   if (!holding_) {
     q_hold_ = state_.q;

@@ -6,7 +6,7 @@ namespace hamel::planner {
 
 namespace {
 
-constexpr std::uint32_t kKind = 0x0204;  // planner, layout 4
+constexpr std::uint32_t kKind = 0x0205;  // planner, layout 5
 
 struct SavedGoal {
   std::uint64_t id = 0, kind = 0;
@@ -119,7 +119,16 @@ std::optional<Problem> PlannerService::open_checkpoint() {
                                        [this](std::span<const std::byte> bytes) { return load(bytes); });
   if (!c) return c.error();
   checkpoint_ = std::move(c).value();
+  packed_.reserve(kCapacity);
+  pack_question();  // the one that was loaded, if any
   return {};
+}
+
+/// Once, when it is asked: it is saved in every cycle until the answer is there.
+void PlannerService::pack_question() {
+  if (!checkpoint_) return;
+  runtime::Packer p(packed_question_);
+  put(p, question_);
 }
 
 void PlannerService::save() {
@@ -139,7 +148,7 @@ void PlannerService::save() {
   p.put(command_.caused_by);
   const bool waiting = planner_.memory().waypoint.waiting != 0 && escape_.valid();
   p.put(static_cast<std::uint64_t>(waiting));
-  if (waiting) put(p, question_);
+  if (waiting) packed_.insert(packed_.end(), packed_question_.begin(), packed_question_.end());
   checkpoint_->save(packed_);
 }
 

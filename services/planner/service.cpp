@@ -75,7 +75,10 @@ void PlannerService::take_goals() {
   wire::Goal g;
   while (goal_in_.take(g)) {
     if (g.arm != scene_.arm || (goal_ && g.id < goal_->id)) continue;
-    if (!goal_ || g.id > goal_->id) spdlog::info("goal {}", g.id);
+    if (!goal_ || g.id > goal_->id) {
+      spdlog::info("goal {}", g.id);
+      forget_escape();
+    }
     goal_ = from_wire(g);
     planner_.set_goal(*goal_);
   }
@@ -91,6 +94,7 @@ void PlannerService::take_modes() {
     } else {
       if (m.mode == wire::Mode::resume) mode_.reset();
       // From rest again, without the clocks and faults of before: the goal is as new.
+      forget_escape();
       planner_.clear_goal();
       if (goal_) planner_.set_goal(*goal_);
       planner_.ramp_in();
@@ -165,7 +169,13 @@ void PlannerService::meet(const wire::ArmState& s) {
   const bool known = incarnation_.has_value();
   incarnation_ = s.incarnation;
   if (known) spdlog::info("arm {} began anew (incarnation {})", s.arm, s.incarnation);
+  if (s.caused_by.size > 0 && !memory_step_)
+    spdlog::warn(
+        "arm {} was driven before: what it was told since is not known here (--state-dir keeps it); goal {} "
+        "of the scene holds",
+        s.arm, goal_ ? goal_->id : 0);
   view_.begin(s.incarnation);
+  forget_escape();
   memory_step_.reset();
   planner_ = Planner(scene_.robot, scene_.planner, savings(scene_));
   if (goal_) planner_.set_goal(*goal_);
@@ -247,6 +257,7 @@ void PlannerService::ask_escape(const Input& in) {
 
 void PlannerService::start_escape() {
   forget_escape();
+  pack_question();
   escape_due_ = question_.step + planner_.escape_steps(scene_.dynamics.dt_s);
   escape_stop_ = false;
   escape_ = std::async(std::launch::async, [this, question = question_] {
@@ -319,6 +330,7 @@ void PlannerService::send_report(Time now) {
   last_report_ = now;
   report_.arm = scene_.arm;
   report_.epoch = epoch_;
+  report_.goal_id = goal_ ? goal_->id : 0;
   report_.mode_id = mode_id_;
   report_out_.publish(report_);
 }

@@ -60,6 +60,7 @@ class PlannerService final : public runtime::Service {
   void send_report(Time now);
   void publish_status(Time now, wire::ServiceState state);
   std::optional<Problem> open_checkpoint();
+  void pack_question();
   void save();
   bool load(std::span<const std::byte> bytes);
 
@@ -103,6 +104,7 @@ class PlannerService final : public runtime::Service {
   std::atomic<bool> escape_stop_ = false;  ///< before escape_: outlives the question
   std::future<Escape> escape_;             ///< valid: question_ is out, its answer due at step escape_due_
   EscapeQuestion question_;
+  std::vector<std::byte> packed_question_;
   std::uint64_t escape_due_ = 0;
   runtime::RateLimit refusals_;
   int leaps_in_a_row_ = 0;

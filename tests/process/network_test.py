@@ -123,6 +123,9 @@ class Talk(unittest.TestCase):
             code, out, err = hamel("goal", "--position", 2, -2, 0, *domain)
             self.assertEqual(code, 0, err)
             self.assertIn("goal 2", out)
+            code, out, err = hamel("goal", "--joints", 0, 0, 0, *domain)
+            self.assertEqual(code, 2, (out, err))
+            self.assertIn("4 joints", err)
             code, out, err = hamel("goal", "--position", 9, 9, 0, *domain)
             self.assertEqual(code, 1, (out, err))
             self.assertIn("unreachable", out)
@@ -130,6 +133,21 @@ class Talk(unittest.TestCase):
             self.assertEqual(code, 0, err)
             for name in ("dynamics", "planner", "perception"):
                 self.assertIn(name, out)
+
+    def test_a_goal_is_confirmed_though_the_arm_is_silent(self):
+        domain = ["--domain", 59]
+        with Up(scene("four_link_avoid"), "--set", "planner.method=gyro", "--set", "stop=at_duration", "--duration", "40",
+                *domain) as up:
+            arm = up.child("dynamics")
+            code, out, err = hamel("goal", "--position", 2, -2, 0, *domain)  # it runs
+            self.assertEqual(code, 0, err)
+            os.kill(arm, signal.SIGSTOP)
+            try:
+                code, out, err = hamel("goal", "--position", 2, 2, 0, *domain)
+            finally:
+                os.kill(arm, signal.SIGCONT)
+            self.assertEqual(code, 0, (out, err))
+            self.assertIn("goal 3 taken", out)
 
     def test_nobody_there_is_exit_code_three(self):
         for verb in (["stop"], ["status"], ["goal", "--position", 1, 0, 0]):

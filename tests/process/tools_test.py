@@ -62,6 +62,16 @@ class Topic(unittest.TestCase):
                 self.assertGreater(json.loads(out)["answers"], 100)
 
 
+    def test_an_echo_to_a_full_disk_ends(self):
+        with Up(scene("four_link_avoid"), "--set", "stop=at_duration", "--duration", "40", "--domain", "98") as up:
+            up.child("dynamics")
+            with open("/dev/full", "w") as full:
+                done = subprocess.run([BIN / "hamel", "topic", "echo", "state", "--domain", "98", "--seconds", "20"], stdout=full,
+                                      stderr=subprocess.PIPE, text=True, timeout=60)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("standard output", done.stderr)
+
+
 class Arms(unittest.TestCase):
     def test_two_arms_in_one_process_each_go_to_their_own_goal(self):
         with tempfile.TemporaryDirectory() as folder:

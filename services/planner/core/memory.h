@@ -54,7 +54,8 @@ struct Waypoint {
   std::array<double, kMaxWaypoint> q{};
 };
 
-/// Copy it, save it, load it.  Every field is eight bytes wide: there is no padding to differ.
+/// Copy it, save it, load it.  Every field is eight bytes wide: there is no padding to differ.  Whoever
+/// changes a field or what it means raises kKind in resume.cpp.
 struct Memory {
   std::uint64_t cycles = 0;             ///< plan() calls
   std::uint64_t state = 0, reason = 0;  ///< of the last report (State, Reason)
