@@ -36,9 +36,7 @@ struct Problem {
 /// Everything a validation found wrong, in the order of the input.  Empty means valid.
 using Problems = std::vector<Problem>;
 
-inline std::string to_string(const Problem& p) {
-  return p.where + (p.what.starts_with("= ") ? " " : ": ") + p.what;
-}
+inline std::string to_string(const Problem& p) { return p.where + ": " + p.what; }
 
 /// A value, or every problem that kept it from being made.
 template <class T>

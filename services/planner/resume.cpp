@@ -140,7 +140,8 @@ void PlannerService::save() {
   p.put(*memory_step_);
   p.put(mode_.has_value() ? static_cast<std::int64_t>(*mode_) : -1);
   p.put(mode_id_);
-  put(p, goal_.value_or(scene::Goal()));
+  const scene::Goal none;
+  put(p, goal_ ? *goal_ : none);
   p.put(planner_.memory());
   p.put(command_.step);
   p.put(static_cast<std::uint32_t>(command_.planner_state));

@@ -34,19 +34,19 @@ class Open : public testing::TestWithParam<Vendor> {
 TEST_P(Open, NamesAnInterfaceThatDoesNotExist) {
   NodeOptions o = options(20);
   o.interface_name = "nosuch0";
-  EXPECT_TRUE(sentence(o).starts_with("interface = nosuch0, does not exist; there are: ")) << sentence(o);
+  EXPECT_TRUE(sentence(o).starts_with("interface: = nosuch0, does not exist; there are: ")) << sentence(o);
   o.interface_name = "192.0.2.77";
-  EXPECT_TRUE(sentence(o).starts_with("interface = 192.0.2.77, does not exist")) << sentence(o);
+  EXPECT_TRUE(sentence(o).starts_with("interface: = 192.0.2.77, does not exist")) << sentence(o);
 }
 
 TEST_P(Open, NamesAPeerThatIsNoAddress) {
   NodeOptions o = options(20);
   o.peers = {"127.0.0.1", "robot.local"};
-  EXPECT_EQ(sentence(o), "peers = robot.local, must be an IPv4 address");
+  EXPECT_EQ(sentence(o), "peers: = robot.local, must be an IPv4 address");
 }
 
 TEST_P(Open, RefusesADomainWithoutPorts) {
-  EXPECT_EQ(sentence(options(233)), "domain = 233, must be 0..232 (a larger one has no UDP ports)");
+  EXPECT_EQ(sentence(options(233)), "domain: = 233, must be 0..232 (a larger one has no UDP ports)");
   EXPECT_EQ(sentence(options(232)), "opened");
 }
 
@@ -63,7 +63,7 @@ TEST_P(Open, SaysThatNoParticipantIndexIsFree) {
     sockets.push_back(fd);
   }
   EXPECT_TRUE(sentence(options(domain))
-                  .starts_with("domain = " + std::to_string(domain) + ", has no free participant index"))
+                  .starts_with("domain: = " + std::to_string(domain) + ", has no free participant index"))
       << sentence(options(domain));
   close(sockets.back());
   EXPECT_EQ(sentence(options(domain)), "opened");
@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(Vendors, Open, testing::Values(Vendor::fastdds, Vendor:
 TEST(Vendors, AreFoundByName) {
   EXPECT_EQ(bus::vendor_from("cyclonedds").value(), Vendor::cyclonedds);
   EXPECT_EQ(to_string(bus::vendor_from("opendds").error()),
-            "bus = opendds, must be inproc, fastdds or cyclonedds");
+            "bus: = opendds, must be inproc, fastdds or cyclonedds");
 }
 
 }  // namespace

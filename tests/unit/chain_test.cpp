@@ -51,8 +51,8 @@ INSTANTIATE_TEST_SUITE_P(
         Spoiled{"base", [](ChainSpec& s) { s.X_WB0.p[0] = INFINITY; }, "X_WB0"},
         Spoiled{"tip", [](ChainSpec& s) { s.X_NE.R *= 2; }, "X_NE"},
         Spoiled{"gravity", [](ChainSpec& s) { s.gravity_W_mps2[2] = kNaN; }, "gravity"},
-        Spoiled{"mass", [](ChainSpec& s) { s.links[2].inertia.mass_kg = -1; }, "mass_kg = -1"},
-        Spoiled{"mass_nan", [](ChainSpec& s) { s.links[2].inertia.mass_kg = kNaN; }, "mass_kg = nan"},
+        Spoiled{"mass", [](ChainSpec& s) { s.links[2].inertia.mass_kg = -1; }, "mass_kg: = -1"},
+        Spoiled{"mass_nan", [](ChainSpec& s) { s.links[2].inertia.mass_kg = kNaN; }, "mass_kg: = nan"},
         Spoiled{"inertia_zero", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2.setZero(); },
                 "positive definite"},
         Spoiled{"inertia_negative", [](ChainSpec& s) { s.links[2].inertia.about_com_kgm2(1, 1) = -1; },
@@ -63,9 +63,9 @@ INSTANTIATE_TEST_SUITE_P(
         Spoiled{"none", [](ChainSpec& s) { s.links[1].inertia = {}; }, "needs mass and inertia"},
         Spoiled{"limits", [](ChainSpec& s) { s.joints[0].limits.lower = 1, s.joints[0].limits.upper = 0; },
                 "lower 1"},
-        Spoiled{"effort", [](ChainSpec& s) { s.joints[0].limits.effort = 0; }, "effort = 0"},
-        Spoiled{"damping", [](ChainSpec& s) { s.joints[0].damping = -1; }, "damping = -1"},
-        Spoiled{"armature", [](ChainSpec& s) { s.joints[0].armature = kNaN; }, "armature = nan"}),
+        Spoiled{"effort", [](ChainSpec& s) { s.joints[0].limits.effort = 0; }, "effort: = 0"},
+        Spoiled{"damping", [](ChainSpec& s) { s.joints[0].damping = -1; }, "damping: = -1"},
+        Spoiled{"armature", [](ChainSpec& s) { s.joints[0].armature = kNaN; }, "armature: = nan"}),
     [](const auto& row) { return row.param.name; });
 
 TEST(Chain, SlidesKeepToTheFartherOfTheirLimits) {
