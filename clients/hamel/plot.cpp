@@ -147,7 +147,8 @@ class Picture {
     View& v = views_[i];
     for (const Row& r : c_.rows) v.cover(r.tip_m[v.across], r.tip_m[v.up]);
     // Both axes have one scale: labels of one step do not meet on the shorter one either.
-    if (std::isfinite(v.span()) && v.span() > 0) s_.add("set xtics {0:g}\nset ytics {0:g}\n", tic_step(v.span()));
+    if (std::isfinite(v.span()) && v.span() > 0)
+      s_.add("set xtics {0:g}\nset ytics {0:g}\n", tic_step(v.span()));
     s_.add(
         "set size ratio -1\nset yrange [*:*]\nset key outside bottom center horizontal\nset xlabel '{} "
         "[m]'\nset ylabel '{} [m]'\nplot ",
