@@ -69,7 +69,7 @@ template <class G>
 bool Marcher<G>::holds(const State& s) const noexcept {
   const std::size_t own = now_.history.size();
   return loaded_ && same(now_.q, s.q) && same(now_.p, s.p) && same(now_.qd, s.qd) &&
-         std::memcmp(s.history.data(), now_.history.data(), own * sizeof(double)) == 0 &&
+         (own == 0 || std::memcmp(s.history.data(), now_.history.data(), own * sizeof(double)) == 0) &&
          s.history[own] == ledger_.made_up && s.history[own + 1] == ledger_.exchanged;
 }
 
