@@ -43,20 +43,14 @@ int nobody(const char* verb, const char* whom, const runtime::BusOptions& o) {
   return runtime::kNoData;
 }
 
-}  // namespace
-
-int goal(const GoalArgs& args) {
-  auto node = client_node(args.bus);
-  if (!node) return runtime::complain("hamel goal", {node.error()});
-  bus::Node& n = *node.value();
+/// The goal on the command line, without an id yet.
+Result<wire::Goal, Problem> goal_of(const GoalArgs& args) {
   wire::Goal g;
   g.arm = args.arm;
   const auto& from = !args.pose.empty() ? args.pose : args.position_m;
   if (!args.joints.empty()) {
     if (args.joints.size() > wire::kMaxJoints)
-      return runtime::complain(
-          "hamel goal",
-          {{"--joints", fmt::format("{} values, at most {}", args.joints.size(), wire::kMaxJoints)}});
+      return Problem{"--joints", fmt::format("{} values, at most {}", args.joints.size(), wire::kMaxJoints)};
     g.kind = wire::GoalKind::joints;
     g.joints =
         Eigen::Map<const Eigen::VectorXd>(args.joints.data(), static_cast<Eigen::Index>(args.joints.size()));
@@ -67,14 +61,23 @@ int goal(const GoalArgs& args) {
   if (!args.pose.empty()) {
     g.orientation_xyzw = Eigen::Map<const Eigen::Vector4d>(args.pose.data() + 3);
     const double norm = g.orientation_xyzw.norm();
-    if (!(norm > 1e-6))
-      return runtime::complain("hamel goal", {{"--pose", "the quaternion must not be zero"}});
+    if (!(norm > 1e-6)) return Problem{"--pose", "the quaternion must not be zero"};
     g.orientation_xyzw /= norm;
   }
-
   if (!g.position_m.allFinite() || !g.orientation_xyzw.allFinite() || !g.joints.allFinite())
-    return runtime::complain("hamel goal", {{"target", "every number must be finite"}});
+    return Problem{"target", "every number must be finite"};
+  return g;
+}
 
+}  // namespace
+
+int goal(const GoalArgs& args) {
+  auto node = client_node(args.bus);
+  if (!node) return runtime::complain("hamel goal", {node.error()});
+  bus::Node& n = *node.value();
+  auto asked = goal_of(args);
+  if (!asked) return runtime::complain("hamel goal", {asked.error()});
+  wire::Goal g = std::move(asked).value();
   if (!args.joints.empty()) {
     wire::Subscription<wire::ArmState> states(n);
     wire::ArmState s;
