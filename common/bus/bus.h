@@ -106,8 +106,8 @@ class Node {
   /// `depth` samples of each key wait for it, the newest; 0: as many as the topic's delivery says (a recorder
   /// wants more).
   virtual std::unique_ptr<Reader> reader(const Topic& topic, int depth = 0, Ask ask = Ask::data) = 0;
-  /// The readers and writers of other participants on this domain, as far as they are known (inproc: all of
-  /// the process).  Allocates; on the owner's thread.
+  /// The readers and writers of other participants on this domain, as far as they and their participants are
+  /// known (inproc: all of the process).  Allocates; on the owner's thread.
   virtual std::vector<Endpoint> endpoints() = 0;
   /// How many times an end of this node met a peer whose QoS cannot match.
   virtual std::uint64_t incompatible() const = 0;

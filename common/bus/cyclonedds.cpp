@@ -246,6 +246,14 @@ WriterId id_of(const dds_guid_t& guid) {
   return id;
 }
 
+std::string name_of(const dds_builtintopic_participant_t& p) {
+  char* name = nullptr;
+  if (!dds_qget_entity_name(p.qos, &name) || name == nullptr) return {};
+  std::string out = name;
+  dds_free(name);
+  return out;
+}
+
 Endpoint endpoint_of(const dds_builtintopic_endpoint_t& e, bool writes) {
   Endpoint out{.topic = e.topic_name, .type = e.type_name, .writes = writes};
   dds_reliability_kind_t reliability = DDS_RELIABILITY_BEST_EFFORT;
@@ -301,27 +309,25 @@ class CycloneNode final : public Node {
   }
 
   std::vector<Endpoint> endpoints() override {
-    std::map<WriterId, std::string> names;
-    read_builtin<dds_builtintopic_participant_t>(participant_, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT,
-                                                 [&](const dds_builtintopic_participant_t& p) {
-                                                   char* name = nullptr;
-                                                   if (!dds_qget_entity_name(p.qos, &name) || name == nullptr)
-                                                     return;
-                                                   names[id_of(p.key)] = name;
-                                                   dds_free(name);
-                                                 });
-    dds_guid_t own{};
-    dds_get_guid(participant_, &own);
-    std::vector<Endpoint> all;
+    std::vector<std::pair<WriterId, Endpoint>> ends;  // with their participants
     for (const bool writes : {true, false})
       read_builtin<dds_builtintopic_endpoint_t>(
           participant_, writes ? DDS_BUILTIN_TOPIC_DCPSPUBLICATION : DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION,
-          [&](const dds_builtintopic_endpoint_t& e) {
-            if (id_of(e.participant_key) == id_of(own)) return;
-            all.push_back(endpoint_of(e, writes));
-            if (const auto name = names.find(id_of(e.participant_key)); name != names.end())
-              all.back().participant = name->second;
-          });
+          [&](const auto& e) { ends.emplace_back(id_of(e.participant_key), endpoint_of(e, writes)); });
+    // Read last: Cyclone finds a participant before its ends.
+    std::map<WriterId, std::string> names;
+    read_builtin<dds_builtintopic_participant_t>(participant_, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT,
+                                                 [&](const auto& p) { names[id_of(p.key)] = name_of(p); });
+    dds_guid_t own{};
+    dds_get_guid(participant_, &own);
+    names.erase(id_of(own));
+    std::vector<Endpoint> all;
+    for (auto& [participant, end] : ends) {
+      const auto name = names.find(participant);
+      if (name == names.end()) continue;  // our own, or gone meanwhile
+      end.participant = name->second;
+      all.push_back(std::move(end));
+    }
     return all;
   }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }

@@ -79,9 +79,10 @@ class Neighbours final : public dds::DomainParticipantListener {
     const std::lock_guard lock(mutex_);
     std::vector<Endpoint> known;
     for (const auto& [guid, end] : ends_) {
+      const auto name = names_.find(guid.guidPrefix);
+      if (name == names_.end()) continue;  // another thread is about to tell of its participant
       known.push_back(end);
-      if (const auto name = names_.find(guid.guidPrefix); name != names_.end())
-        known.back().participant = name->second;
+      known.back().participant = name->second;
     }
     return known;
   }

@@ -325,6 +325,7 @@ TEST_P(Bus, BrokenPromisesAreCounted) {
   EXPECT_EQ(lenient->counters().late, 0U) << "did not ask";
 }
 
+/// From the first listing on, no end stands there without its participant.
 TEST_P(Bus, ListsTheEndsOfOthers) {
   const auto a = from(16), b = to(16);
   const auto writer = a->writer(topics::kGoal);
@@ -332,6 +333,7 @@ TEST_P(Bus, ListsTheEndsOfOthers) {
   std::vector<bus::Endpoint> ends;
   ASSERT_TRUE(wait_for(*b, [&] {
     ends = b->endpoints();
+    for (const bus::Endpoint& e : ends) EXPECT_TRUE(!e.writes || e.participant == "hamel") << e.topic;
     return ends.size() >= 2;
   }));
   ASSERT_EQ(ends.size(), 2U);
@@ -340,10 +342,7 @@ TEST_P(Bus, ListsTheEndsOfOthers) {
     EXPECT_EQ(e.type, e.writes ? "hamel::v1::Goal" : "hamel::v1::ArmState");
     EXPECT_TRUE(e.reliable);
     EXPECT_EQ(e.latched, e.writes);
-    if (e.writes) {
-      EXPECT_EQ(e.id, writer->id());
-      EXPECT_EQ(e.participant, "hamel");
-    }
+    EXPECT_TRUE(!e.writes || e.id == writer->id());
   }
 }
 
