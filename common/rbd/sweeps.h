@@ -19,10 +19,11 @@ struct Factor {
 /// Articulated-body factorisation of M(q) + diag(extra), O(n).  `extra` may be null.
 /// The parent sees X^T (I^A - U U^T / D) X, U = I^A A, as X^T I^A X - (X^T U)(X^T U)^T / D: nothing but the
 /// last product waits for the division.
-template <class G, class S>
+/// Calls then(i) when joint i is done, from the tip: what else runs that way fills the waits.
+template <class G, class S, class Then>
 [[gnu::always_inline]] inline void factorise(const typename G::Chain& chain,
                                              const typename G::template Frame<S>* X, const S* extra,
-                                             Factor<G, S>* f) noexcept {
+                                             Factor<G, S>* f, const Then& then) noexcept {
   typename G::template Inertia<S> I{};
   for (int i = chain.n(); i-- > 0;) {
     const auto& k = chain[i];
@@ -31,10 +32,48 @@ template <class G, class S>
     S D = along(k, X[i], U) + k.armature;
     if (extra) D = D + extra[i];
     f[i].D_inv = 1.0 / D;
-    if (i == 0) break;
-    U = to_parent(X[i], U);
-    f[i].W = f[i].D_inv * U;
-    I = deflate(to_parent(X[i], I), f[i].W, U);
+    if (i > 0) {
+      U = to_parent(X[i], U);
+      f[i].W = f[i].D_inv * U;
+      I = deflate(to_parent(X[i], I), f[i].W, U);
+    }
+    then(i);
+  }
+}
+template <class G, class S>
+[[gnu::always_inline]] inline void factorise(const typename G::Chain& chain,
+                                             const typename G::template Frame<S>* X, const S* extra,
+                                             Factor<G, S>* f) noexcept {
+  factorise<G, S>(chain, X, extra, f, [](int) {});
+}
+
+/// The way from the tip of x = (M + diag(extra))^-1 (b - A^T W): u_i = (b_i - A_i^T p_i) / D_i.
+template <class G, class S>
+struct Inward {
+  const typename G::Chain& chain;
+  const typename G::template Frame<S>* X;
+  const Factor<G, S>* f;
+  const S* b;
+  S* u;
+  const typename G::template Motion<S>* wrench = nullptr;
+  typename G::template Motion<S> p{};
+  [[gnu::always_inline]] void operator()(int i) noexcept {
+    if (wrench) p = p + wrench[i];
+    const S y = b[i] - along(chain[i], X[i], p);
+    u[i] = y * f[i].D_inv;
+    if (i > 0) p = to_parent(X[i], p) + y * f[i].W;
+  }
+};
+/// The way back: x from u.
+template <class G, class S>
+[[gnu::always_inline]] inline void solve_outward(const typename G::Chain& chain,
+                                                 const typename G::template Frame<S>* X,
+                                                 const Factor<G, S>* f, const S* u, S* x) noexcept {
+  typename G::template Motion<S> a{};
+  for (int i = 0; i < chain.n(); ++i) {
+    x[i] = i > 0 ? u[i] - dot(f[i].W, a) : u[i];
+    if (i > 0) a = to_child(X[i], a);
+    add_along(chain[i], X[i], a, x[i]);
   }
 }
 /// x = (M + diag(extra))^-1 (b - A^T W) from the factorisation, O(n), where W_i is the sum of the wrenches
@@ -44,20 +83,18 @@ template <class G, class S>
                                          const typename G::template Frame<S>* X, const Factor<G, S>* f,
                                          const S* b, S* u, S* x,
                                          const typename G::template Motion<S>* wrench = nullptr) noexcept {
-  typename G::template Motion<S> p{};
-  for (int i = chain.n(); i-- > 0;) {
-    const auto& k = chain[i];
-    if (wrench) p = p + wrench[i];
-    const S y = b[i] - along(k, X[i], p);
-    u[i] = y * f[i].D_inv;
-    if (i > 0) p = to_parent(X[i], p) + y * f[i].W;
-  }
-  typename G::template Motion<S> a{};
-  for (int i = 0; i < chain.n(); ++i) {
-    x[i] = i > 0 ? u[i] - dot(f[i].W, a) : u[i];
-    if (i > 0) a = to_child(X[i], a);
-    add_along(chain[i], X[i], a, x[i]);
-  }
+  Inward<G, S> inward{chain, X, f, b, u, wrench};
+  for (int i = chain.n(); i-- > 0;) inward(i);
+  solve_outward<G, S>(chain, X, f, u, x);
+}
+/// factorise() and solve() in one pass from the tip.
+template <class G, class S>
+[[gnu::always_inline]] inline void factorise_and_solve(
+    const typename G::Chain& chain, const typename G::template Frame<S>* X, Factor<G, S>* f, const S* b, S* u,
+    S* x, const typename G::template Motion<S>* wrench = nullptr) noexcept {
+  Inward<G, S> inward{chain, X, f, b, u, wrench};
+  factorise<G, S>(chain, X, nullptr, f, [&](int i) { inward(i); });
+  solve_outward<G, S>(chain, X, f, u, x);
 }
 
 /// Twists (5) and the wrenches F that the motion and gravity ask for, base to tip, Eq. (8): I a - ad_V^T I V.
@@ -111,8 +148,7 @@ void forward_dynamics(const typename G::Chain& chain, const double* q, const dou
   place(chain, q, w.X.data());
   motion_wrenches<G, double>(chain, qd, nullptr, w.X.data(), w.F.data());
   for (int i = 0; i < chain.n(); ++i) qdd[i] = tau[i] - chain[i].damping * qd[i];
-  factorise<G, double>(chain, w.X.data(), nullptr, w.factor.data());
-  solve<G, double>(chain, w.X.data(), w.factor.data(), qdd, w.u.data(), qdd, w.F.data());
+  factorise_and_solve<G, double>(chain, w.X.data(), w.factor.data(), qdd, w.u.data(), qdd, w.F.data());
 }
 /// tau = M qdd + c + tau_g, O(n).  tau may be qdd.
 template <class G>

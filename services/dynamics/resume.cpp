@@ -8,7 +8,7 @@ namespace hamel::dynamics {
 
 namespace {
 
-constexpr std::uint32_t kKind = 0x0104;  // dynamics, layout 4
+constexpr std::uint32_t kKind = 0x0105;  // dynamics, layout 5
 constexpr std::uint64_t kNone = ~std::uint64_t{0};
 constexpr std::int64_t kNotDriven = std::numeric_limits<std::int64_t>::min();
 

@@ -103,6 +103,21 @@ TEST(Evaluations, OfABentChainAreAtMostFive) {
       }
 }
 
+/// Feedback is tried now and then, and given up where one exact Jacobian costs less.
+TEST(Evaluations, OfALongTautChainStayFew) {
+  const int n = 1000, steps = 600;
+  test::Random rng(1);
+  Integrator integrator(test::checked(test::hanging(n)), {.dt_s = 1e-3});
+  State s = integrator.start(rng.vector(n, 0.7 / n), VectorXd::Zero(n));
+  int evaluations = 0;
+  for (int k = 0; k < steps; ++k) {
+    const StepReport report = integrator.step(s, VectorXd::Zero(n));
+    ASSERT_TRUE(report.usable() && report.substeps == 1) << "step " << k;
+    evaluations += report.evaluations;
+  }
+  EXPECT_LE(evaluations, 2.5 * steps);
+}
+
 TEST(Evaluations, OfAPlanarChainThatFallsAreAtMostFive) {
   for (const int n : {3, 30, 300, 1000}) {
     const model::Chain chain = test::checked(test::planar(n, 1.0 / n, 1.0 / n, 1e-2 / n));

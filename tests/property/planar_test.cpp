@@ -94,7 +94,7 @@ TEST_P(Planar, JacobianIsTheSlopeOfTheResidual) {
   (void)step.evaluate(d - e * x);
   slope = ((slope - step.residual()) / (2 * e)).eval();
   (void)step.evaluate(d);
-  step.linearise();
+  step.linearise_and_solve();
   VectorXd back(n);
   step.solve_linear(slope, back);
   EXPECT_LT((back - x).norm(), 1e-6 * x.norm());

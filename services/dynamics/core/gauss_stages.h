@@ -63,8 +63,7 @@ template <class G, class P>
   gather(job, first, w);
   rbd::place(chain, w.Q, w.X);
   if (job.load->pushed) rbd::wrench_torques<G, P>(chain, w.X, job.load->wrench.data(), w.R, w.push);
-  rbd::factorise<G, P>(chain, w.X, nullptr, w.factor);
-  rbd::solve<G, P>(chain, w.X, w.factor, w.P_, w.u, w.rate);
+  rbd::factorise_and_solve<G, P>(chain, w.X, w.factor, w.P_, w.u, w.rate);
   typename G::template Direction<P> g = P::of(1) * chain.gravity_W;
   typename G::template Motion<P> V{}, H{};
   for (int i = 0; i < n; ++i) {

@@ -13,13 +13,20 @@
 
 namespace hamel::dynamics {
 
+/// How fast an iteration converged when it was last seen; 0: not known.
+struct Past {
+  double rate = 0;  ///< the largest share of the residual that an update left
+  double pace = 0;  ///< the same of two updates in a row, their mean: one alone may be luck
+};
+
 /// The past of an iteration, as it lies in State::history:
-///   [count, h, rate, then of each joint d and its backward differences of order 1 .. kDepth - 1].
+///   [count, h, rate, pace, then of every two joints, order by order, the last increments d and their
+///    backward differences of order 1 .. kDepth - 1]; the last joint of an odd number stands beside zero.
 /// It serves only steps of the same length h.
 class IncrementHistory {
  public:
-  static constexpr int kDepth = 8;
-  static std::size_t size(int n) noexcept { return kHead + static_cast<std::size_t>(kDepth * n); }
+  static constexpr int kDepth = 10;
+  static std::size_t size(int n) noexcept { return kHead + kBlock * static_cast<std::size_t>((n + 1) / 2); }
 
   /// First guess of the increment d: h qd while there is no past, else the polynomial through the last
   /// increments as a sum of backward differences, cut off where they stop falling: smooth motion gets a high
@@ -28,62 +35,62 @@ class IncrementHistory {
   static void guess(const Node<G>& from, double h, VectorXd& increment) noexcept {
     const std::vector<double>& s = from.history;
     const Eigen::Index n = increment.size();
-    const double* qd = from.qd.data();
+    const double *qd = from.qd.data(), *block = s.data() + kHead;
     double* d = increment.data();
-    const int count = s[1] == h ? static_cast<int>(s[0]) : 0;
-    const double* difference = s.data() + kHead;
-    if (count < 2) {
-      for (Eigen::Index i = 0; i < n; ++i) d[i] = h * qd[i];
-      if (count == 0) return;
+    const int count = s[1] == h ? static_cast<int>(std::clamp(s[0], 0.0, double{kDepth})) : 0;
+    if (count < 2) {  // h qd lies between the last increment and the one sought
       for (Eigen::Index i = 0; i < n; ++i)
-        d[i] = 2 * d[i] - difference[kDepth * i];  // h qd lies between the two
+        d[i] = count == 0 ? h * qd[i] : 2 * h * qd[i] - block[i / 2 * Eigen::Index{kBlock} + i % 2];
       return;
     }
-    std::array<double, kDepth> size{}, taken{};
-    for (Eigen::Index i = 0; i < n; ++i)
-      for (int order = 0; order < kDepth; ++order)
-        size[at(order)] += std::abs(difference[kDepth * i + order]);
-    // What is left out is the error; as long as the past is short, its start may be in the differences.
-    const double fall = count < kDepth ? 0.5 : 1;
-    int orders = 1;
-    while (orders < count && size[at(orders)] < fall * size[at(orders - 1)]) ++orders;
-    if (count == kDepth && orders < count) orders = std::max(orders - 1, 1);
-    std::fill_n(taken.begin(), orders, 1.0);
-    using Pair = lie::Pack<2, lie::Baseline>;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      Pair sum;
-      for (int order = 0; order < kDepth; order += 2)
-        sum += Pair::load(&taken[at(order)]) * Pair::load(&difference[kDepth * i + order]);
-      d[i] = sum.v[0] + sum.v[1];
+    const int orders = falling(block, n, count);
+    for (Eigen::Index i = 0; i < n; i += 2, block += kBlock) {
+      Pair sum = Pair::load(block);
+      for (int order = 1; order < orders; ++order) sum += Pair::load(block + 2 * order);
+      d[i] = sum.v[0];
+      if (i + 1 < n) d[i + 1] = sum.v[1];
     }
   }
-  /// Share of the residual that an update left when it was last seen; 0: not known.
   template <class G>
-  static double rate(const Node<G>& from, double h) noexcept {
-    return from.history[1] == h ? from.history[2] : 0;
+  static Past past(const Node<G>& from, double h) noexcept {
+    return from.history[1] == h ? Past{from.history[2], from.history[3]} : Past{};
   }
   /// Puts the increment in front of from's history and writes it to `to`.
   template <class G>
-  static void push(const Node<G>& from, double h, double rate, const VectorXd& increment,
+  static void push(const Node<G>& from, double h, const Past& past, const VectorXd& increment,
                    Node<G>& to) noexcept {
     const std::vector<double>& s = from.history;
     const Eigen::Index n = increment.size();
     const double count = s[1] == h ? s[0] : 0;
     to.history[0] = std::min<double>(count + 1, kDepth);
-    to.history[1] = h, to.history[2] = rate;
+    to.history[1] = h, to.history[2] = past.rate, to.history[3] = past.pace;
     const double *last = s.data() + kHead, *d = increment.data();
     double* next = to.history.data() + kHead;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      double x = d[i];
+    for (Eigen::Index i = 0; i < n; i += 2, last += kBlock, next += kBlock) {
+      Pair x = i + 1 < n ? Pair::load(d + i) : Pair{{d[i], 0}};
       for (int order = 0; order < kDepth; ++order) {
-        next[kDepth * i + order] = x;
-        x -= last[kDepth * i + order];
+        x.store(next + 2 * order);
+        x -= Pair::load(last + 2 * order);
       }
     }
   }
 
  private:
-  static constexpr std::size_t kHead = 3;
+  using Pair = lie::Pack<2, lie::Baseline>;
+  static constexpr std::size_t kHead = 4, kBlock = 2 * kDepth;
+
+  /// How many orders to take.  What is left out is the error; as long as the past is short, its start may be
+  /// in the differences.
+  static int falling(const double* block, Eigen::Index n, int count) noexcept {
+    std::array<Pair, kDepth> sizes;
+    for (Eigen::Index i = 0; i < n; i += 2, block += kBlock)
+      for (int order = 0; order < kDepth; ++order) sizes[at(order)] += abs(Pair::load(block + 2 * order));
+    const auto size = [&](int order) { return sizes[at(order)].v[0] + sizes[at(order)].v[1]; };
+    const double fall = count < kDepth ? 0.5 : 1;
+    int orders = 1;
+    while (orders < count && size(orders) < fall * size(orders - 1)) ++orders;
+    return count == kDepth && orders < count ? std::max(orders - 1, 1) : orders;
+  }
 };
 
 /// Turn bound of the tiers that find increments [rad].
@@ -111,27 +118,35 @@ inline constexpr double kGrowth = 1e6;
 /// error that fall slowly are not seen before the others are gone, so what past steps saw counts as well.
 class Contraction {
  public:
-  /// For a chain of n joints; `rate`: what past steps saw, 0: nothing.
-  explicit Contraction(int n, double rate = 0)
-      : rounding_(kRounding * std::max(1.0, 0.125 * n)), rate_(rate), known_(rate > 0) {}
+  /// For a chain of n joints; `past`: what past steps saw.
+  explicit Contraction(int n, const Past& past = {})
+      : rounding_(kRounding * std::max(1.0, 0.125 * n)),
+        rate_(past.rate),
+        pace_(past.pace),
+        known_(past.rate > 0) {}
   void see(double relative) noexcept {
     if (last_ > 0 && (last_ > kClear * rounding_ || rate_ == 0)) {
       known_ = known_ || seen_ > 0;
       seen_ = std::max(seen_, relative / last_);
       rate_ = std::max(rate_, seen_);
+      if (before_ > 0) pace_seen_ = std::max(pace_seen_, std::sqrt(relative / before_));
+      pace_ = std::max(pace_, pace_seen_);
     } else if (last_ > 0) {
       bound_ = std::max(bound_, relative / last_);
     }
-    last_ = relative;
+    before_ = last_, last_ = relative;
   }
   /// For an equation whose residual is already what the next update leaves.
   void look_no_further() noexcept { least_ = std::numeric_limits<double>::infinity(); }
   /// From now on updates are made by an exact Jacobian: what others left says nothing.
-  void sharpen() noexcept { rate_ = seen_ = 0, known_ = true; }
+  void sharpen() noexcept { rate_ = seen_ = 0, known_ = true, least_ = kLeastExact; }
   /// 0: not known.
   double rate() const noexcept { return rate_; }
   /// The largest in this step; 0: none was seen.
   double seen() const noexcept { return seen_; }
+  /// The same of two updates in a row.
+  double pace() const noexcept { return pace_; }
+  double pace_seen() const noexcept { return pace_seen_; }
   /// The same where rounding hides it: it was no more; 0: nothing is known.
   double bound() const noexcept { return bound_; }
   bool done() const noexcept { return within(1); }
@@ -141,19 +156,20 @@ class Contraction {
   bool ends_next() const noexcept {
     return known_ && rate_ > 0 && rate_ < 1 && last_ * std::max(rate_, least_) <= rounding_;
   }
-  /// At this rate so many updates are needed, or more; false when it is not known.
+  /// At this pace so many updates are needed, or more; false when it is not known.
   bool needs(int updates) const noexcept {
     double left = last_;
-    for (int k = 1; k < updates; ++k) left *= rate_;
-    return rate_ > 0 && left > rounding_;
+    for (int k = 1; k < updates; ++k) left *= pace_;
+    return pace_ > 0 && left > rounding_;
   }
 
  private:
   static constexpr double kClear = 100;  ///< a residual so much above rounding is known well
   /// No update is trusted to leave less, for motion changes from step to step; and the momentum handed on is
   /// that of the last evaluation, which must not be far from the root.
-  static constexpr double kLeast = 1e-3;
-  double rounding_, rate_, seen_ = 0, bound_ = 0, last_ = 0, least_ = kLeast;
+  static constexpr double kLeast = 1e-3, kLeastExact = 1e-4;
+  double rounding_, rate_, pace_, seen_ = 0, pace_seen_ = 0, bound_ = 0, before_ = 0, last_ = 0,
+                                  least_ = kLeast;
   bool known_;
 };
 

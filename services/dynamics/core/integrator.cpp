@@ -91,7 +91,7 @@ class Arm final : public Integrator::Impl {
   State start(const VectorXd& q0, const VectorXd& qd0) const override { return marcher_.start(q0, qd0); }
   StepReport step(State& state, const VectorXd& tau) noexcept override {
     if (tau.size() != axis_.n() || !all_finite(tau)) return {};
-    const int saturated = cut(tau);
+    const int saturated = cut(tau.data());
     StepReport report = marcher_.step(state, load_);
     report.saturated = saturated;
     if (report.usable()) report.beyond_limits = outside(state);
@@ -119,20 +119,21 @@ class Arm final : public Integrator::Impl {
 
  private:
   /// Takes tau as far as the joints give it; how many give less.
-  int cut(const VectorXd& tau) noexcept {
+  int cut(const double* tau) noexcept {
+    double* given = load_.tau.data();
     int count = 0;
-    for (int i = 0; i < axis_.n(); ++i) {
-      const double effort = limits_[at(i)].effort;
-      load_.tau[i] = std::clamp(tau[i], -effort, effort);
-      count += load_.tau[i] != tau[i];
+    for (const model::JointLimits& limits : limits_) {
+      *given = std::clamp(*tau, -limits.effort, limits.effort);
+      count += *given++ != *tau++;
     }
     return count;
   }
   int outside(const State& s) const noexcept {
+    const double *q = s.q.data(), *qd = s.qd.data();
     int count = 0;
-    for (int i = 0; i < axis_.n(); ++i) {
-      const model::JointLimits& limits = limits_[at(i)];
-      count += s.q[i] < limits.lower || s.q[i] > limits.upper || std::abs(s.qd[i]) > limits.velocity;
+    for (const model::JointLimits& limits : limits_) {
+      count += (*q < limits.lower) | (*q > limits.upper) | (std::abs(*qd) > limits.velocity);
+      ++q, ++qd;
     }
     return count;
   }

@@ -32,12 +32,10 @@ Marcher<G>::Marcher(const Chain& chain, const Options& options, std::unique_ptr<
     : chain_(chain),
       options_(options),
       tier_(std::move(tier)),
-      now_(chain),
-      next_(chain),
-      q_(now_.q),
-      p_(now_.q) {
-  now_.history.assign(tier_->history_size(), 0);
-  next_.history = now_.history;
+      nodes_{Node<G>(chain), Node<G>(chain)},
+      q_(now_->q),
+      p_(now_->q) {
+  for (Node<G>& node : nodes_) node.history.assign(tier_->history_size(), 0);
 }
 
 template <class G>
@@ -49,14 +47,14 @@ State Marcher<G>::start(const VectorXd& q0, const VectorXd& qd0) const {
     const VectorXd p = node.p;
     node.move_with_momentum(chain_, p);
   }
-  return {0, node.q, node.p, node.qd, std::vector<double>(now_.history.size() + Ledger::kSize, 0)};
+  return {0, node.q, node.p, node.qd, std::vector<double>(now_->history.size() + Ledger::kSize, 0)};
 }
 
 template <class G>
 bool Marcher<G>::fits(const State& s) const noexcept {
   const auto n = chain_.n();
   return s.q.size() == n && s.p.size() == n && s.qd.size() == n &&
-         s.history.size() == now_.history.size() + Ledger::kSize;
+         s.history.size() == now_->history.size() + Ledger::kSize;
 }
 
 template <class G>
@@ -67,9 +65,9 @@ bool Marcher<G>::acceptable(const State& s) const noexcept {
 /// True when `s` is what `now` was stored to.
 template <class G>
 bool Marcher<G>::holds(const State& s) const noexcept {
-  const std::size_t own = now_.history.size();
-  return loaded_ && same(now_.q, s.q) && same(now_.p, s.p) && same(now_.qd, s.qd) &&
-         (own == 0 || std::memcmp(s.history.data(), now_.history.data(), own * sizeof(double)) == 0) &&
+  const std::size_t own = now_->history.size();
+  return loaded_ && same(now_->q, s.q) && same(now_->p, s.p) && same(now_->qd, s.qd) &&
+         (own == 0 || std::memcmp(s.history.data(), now_->history.data(), own * sizeof(double)) == 0) &&
          s.history[own] == ledger_.made_up && s.history[own + 1] == ledger_.exchanged;
 }
 
@@ -81,24 +79,24 @@ bool Marcher<G>::load(const State& s) noexcept {
   if (!fits(s)) return false;
   if (holds(s)) return true;
   if (!acceptable(s)) return false;
-  const std::size_t own = now_.history.size();
-  std::copy_n(s.history.begin(), own, now_.history.begin());
+  const std::size_t own = now_->history.size();
+  std::copy_n(s.history.begin(), own, now_->history.begin());
   ledger_ = {s.history[own], s.history[own + 1]};
-  now_.place(chain_, s.q);
+  now_->place(chain_, s.q);
   if (tier_->integrates_velocity()) {
-    now_.move_with_velocity(chain_, s.qd);
+    now_->move_with_velocity(chain_, s.qd);
   } else {
-    now_.move_with_momentum(chain_, s.p);
+    now_->move_with_momentum(chain_, s.p);
   }
   return loaded_ = true;
 }
 
 template <class G>
 void Marcher<G>::store(State& s) const noexcept {
-  s.q = now_.q, s.p = now_.p, s.qd = now_.qd;
-  std::copy(now_.history.begin(), now_.history.end(), s.history.begin());
-  s.history[now_.history.size()] = ledger_.made_up;
-  s.history[now_.history.size() + 1] = ledger_.exchanged;
+  s.q = now_->q, s.p = now_->p, s.qd = now_->qd;
+  std::copy(now_->history.begin(), now_->history.end(), s.history.begin());
+  s.history[now_->history.size()] = ledger_.made_up;
+  s.history[now_->history.size() + 1] = ledger_.exchanged;
   ++s.step;
 }
 
@@ -106,19 +104,19 @@ void Marcher<G>::store(State& s) const noexcept {
 /// and against drift.
 template <class G>
 bool Marcher<G>::sane(const StepReport& report, const Load<G>& load, double h) const noexcept {
-  const double bound = tier_->turn_bound(), *q = now_.q.data(), *qd = now_.qd.data(),
-               *q_next = next_.q.data(), *p_next = next_.p.data(), *qd_next = next_.qd.data(),
+  const double bound = tier_->turn_bound(), *q = now_->q.data(), *qd = now_->qd.data(),
+               *q_next = next_->q.data(), *p_next = next_->p.data(), *qd_next = next_->qd.data(),
                *tau = load.tau.data();
   double work = std::abs(report.work_J), poison = 0;
   for (int i = 0; i < chain_.n(); ++i) {
     const double d = q_next[i] - q[i];
-    poison += 0 * q_next[i] + 0 * p_next[i] + 0 * qd_next[i];
+    poison += 0 * (q_next[i] + p_next[i] + qd_next[i]);
     if (!chain_[i].prismatic && std::abs(d - h * qd[i]) > bound) return false;
     work += std::abs(tau[i] * d);
   }
   if (poison != 0) return false;
-  const double in_play = now_.energy_J - now_.potential_J + work + chain_.energy_scale + kNothing;
-  const double made_up = next_.energy_J - now_.energy_J - report.work_J;
+  const double in_play = now_->kinetic_J + work + chain_.energy_scale + kNothing;
+  const double made_up = next_->energy_J - now_->energy_J - report.work_J;
   if (!std::isfinite(in_play) || !std::isfinite(made_up)) return false;
   return std::abs(made_up) <= kEnergyBound * in_play && (!tier_->keeps_energy() || allowed(made_up, in_play));
 }
@@ -135,7 +133,7 @@ bool Marcher<G>::allowed(double made_up, double in_play) const noexcept {
 /// One undivided step from `now` to `next`.
 template <class G>
 StepReport Marcher<G>::advance(const Load<G>& load, double h) noexcept {
-  StepReport report = tier_->advance(now_, load, h, next_);
+  StepReport report = tier_->advance(*now_, load, h, *next_);
   if (report.usable() && !sane(report, load, h)) report.stop = Stop::diverged;
   return report;
 }
@@ -163,7 +161,7 @@ StepReport Marcher<G>::march(const Load<G>& load) noexcept {
       part /= 2;
       continue;
     }
-    const double made_up = next_.energy_J - now_.energy_J - r.work_J;
+    const double made_up = next_->energy_J - now_->energy_J - r.work_J;
     total.residual_Nm = std::max(total.residual_Nm, r.residual_Nm);
     total.work_J += r.work_J;
     total.energy_error_J += made_up;
@@ -193,16 +191,16 @@ StepReport Marcher<G>::step(State& s, const Load<G>& acting) noexcept {
 
 template <class G>
 double Marcher<G>::energy(const State& s) noexcept {
-  return load(s) ? now_.energy_J : std::numeric_limits<double>::quiet_NaN();
+  return load(s) ? now_->energy_J : std::numeric_limits<double>::quiet_NaN();
 }
 
 template <class G>
 void Marcher<G>::reweigh(State& s) noexcept {
   loaded_ = false;
   if (!acceptable(s)) return;
-  next_.place(chain_, s.q);
-  next_.move_with_velocity(chain_, s.qd);
-  s.p = next_.p;
+  next_->place(chain_, s.q);
+  next_->move_with_velocity(chain_, s.qd);
+  s.p = next_->p;
 }
 
 template <class G>
@@ -210,12 +208,12 @@ void Marcher<G>::between(const State& before, const State& after, double share, 
                          VectorXd& qd) noexcept {
   if (!acceptable(before) || !acceptable(after)) return;
   const double h = options_.dt_s;
-  next_.q = after.q, next_.p = after.p;
-  std::copy_n(after.history.begin(), next_.history.size(), next_.history.begin());
-  if (tier_->interpolate(next_, (1 - share) * h, q_, p_)) {
-    next_.place(chain_, q_);
-    next_.move_with_momentum(chain_, p_);
-    q = next_.q, qd = next_.qd;
+  next_->q = after.q, next_->p = after.p;
+  std::copy_n(after.history.begin(), next_->history.size(), next_->history.begin());
+  if (tier_->interpolate(*next_, (1 - share) * h, q_, p_)) {
+    next_->place(chain_, q_);
+    next_->move_with_momentum(chain_, p_);
+    q = next_->q, qd = next_->qd;
     return;
   }
   const double t = share, u = 1 - share;

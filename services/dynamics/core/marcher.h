@@ -19,6 +19,8 @@ class Marcher {
  public:
   using Chain = typename G::Chain;
   Marcher(const Chain& chain, const Options& options, std::unique_ptr<TierStep<G>> tier);
+  Marcher(const Marcher&) = delete;
+  Marcher& operator=(const Marcher&) = delete;
 
   State start(const VectorXd& q0, const VectorXd& qd0) const;
   /// Integrator::step(), torques cut already.
@@ -44,7 +46,8 @@ class Marcher {
   const Chain& chain_;
   const Options& options_;
   std::unique_ptr<TierStep<G>> tier_;
-  Node<G> now_, next_;
+  Node<G> nodes_[2];
+  Node<G>*now_ = &nodes_[0], *next_ = &nodes_[1];
   VectorXd q_, p_;  ///< scratch
   Ledger ledger_;
   bool loaded_ = false;

@@ -56,21 +56,21 @@ MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
 template <class G>
 void MidpointStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noexcept {
   from_ = &from, load_ = &load, h_ = h, rate_ = 1 / h;
-  linearised_ = false, rescale_ = true, feedback_rate_ = 0;
+  linearised_ = false, rescale_ = true, feedback_ = {};
 }
 
 template <class G>
 StepReport MidpointStep<G>::advance(const Node<G>& from, const Load<G>& load, double h,
                                     Node<G>& to) noexcept {
   begin(from, load, h);
-  contraction_ = Contraction(chain_.n(), IncrementHistory::rate(from, h));
+  contraction_ = Contraction(chain_.n(), IncrementHistory::past(from, h));
   IncrementHistory::guess(from, h, d_);
   if (options_.root != Root::newton) choose_factorisation(d_);
   if (options_.start == Start::previous) d_.setZero();
   StepReport report = find_root(*this, options_, contraction_, d_);
   if (!report.usable()) return report;
   report.work_J = work(d_.data());
-  IncrementHistory::push(from, h, remembered_rate(), d_, to);
+  IncrementHistory::push(from, h, remembered(), d_, to);
   to.q = from.q + d_;
   to.place(chain_, to.q);
   to.move_with_momentum(chain_, p_next_);
@@ -178,7 +178,7 @@ template <class G>
 bool MidpointStep<G>::newton_pays() const noexcept {
   return options_.root == Root::newton ||
          (options_.root == Root::adaptive &&
-          (linearised_ || (contraction_.rate() < kResolved && contraction_.needs(kWorthNewton))));
+          (linearised_ || (contraction_.pace() < kResolved && contraction_.needs(kWorthNewton))));
 }
 
 /// Eq. (16): d <- d - h M^-1 r.  Newton: the exact Jacobian, made anew where the last one gains too
@@ -191,25 +191,28 @@ void MidpointStep<G>::correct(VectorXd& d) noexcept {
     return;
   }
   if (!linearised_ || contraction_.rate() > kStale) {
-    linearise();
-    feedback_rate_ = std::max(feedback_rate_, linearised_ ? 0 : contraction_.seen());
+    linearise_and_solve();
+    if (!linearised_) feedback_ = {contraction_.seen(), contraction_.pace_seen()};
     contraction_.sharpen();
+  } else {
+    newton_.solve(r_.data(), r_.data());
   }
   linearised_ = true;
-  newton_.solve(r_.data(), r_.data());
   d -= r_;
 }
 
 /// What the next step may expect, of feedback where there is a choice.  What was not seen in this one is
 /// trusted a little less; what Newton spared us from seeing, a little more, until it is tried again.
 template <class G>
-double MidpointStep<G>::remembered_rate() const noexcept {
-  const double before = IncrementHistory::rate(*from_, h_);
+Past MidpointStep<G>::remembered() const noexcept {
+  const Past before = IncrementHistory::past(*from_, h_);
   if (linearised_ && options_.root == Root::adaptive)
-    return feedback_rate_ > 0 ? feedback_rate_ : kForget * before;
+    return {feedback_.rate > 0 ? feedback_.rate : kForget * before.rate,
+            feedback_.pace > 0 ? feedback_.pace : kForget * before.pace};
   const double seen = contraction_.seen(), bound = contraction_.bound();
-  if (seen > 0) return std::min(1.0, std::max(seen, kForget * before));
-  return std::min(bound > 0 ? bound : 1.0, kAge * before);
+  return {seen > 0 ? std::min(1.0, std::max(seen, kForget * before.rate))
+                   : std::min(bound > 0 ? bound : 1.0, kAge * before.rate),
+          contraction_.pace_seen() > 0 ? contraction_.pace_seen() : before.pace};
 }
 
 template class MidpointStep<SE3>;

@@ -38,8 +38,9 @@ class MidpointStep final : public TierStep<G> {
   const VectorXd& residual() const noexcept { return r_; }
   /// d <- d - J^-1 r: Eq. (16) with M^-1 by the factorisation, or Newton.
   void correct(VectorXd& d) noexcept;
-  /// Exact Jacobian at the last evaluate(), and x with J x = r.
-  void linearise() noexcept;
+  /// Exact Jacobian J at the last evaluate(); its residual r becomes J^-1 r.
+  void linearise_and_solve() noexcept;
+  /// x with J x = r.
   void solve_linear(const VectorXd& r, VectorXd& x) noexcept { newton_.solve(r.data(), x.data()); }
 
  private:
@@ -49,7 +50,7 @@ class MidpointStep final : public TierStep<G> {
   JointRow<G> row(int i, const typename G::template Attitude<double>& R, const Motion& H,
                   const Direction& moment, Matrix& P) const noexcept;
   bool newton_pays() const noexcept;
-  double remembered_rate() const noexcept;
+  Past remembered() const noexcept;
   double work(const double* d) const noexcept;
   double diagonal(int i) const noexcept;
 
@@ -73,8 +74,8 @@ class MidpointStep final : public TierStep<G> {
   bool rescale_ = true, brakes_ = false;  ///< brakes_: damping or stops
   // Newton: the factorisation serves while it converges fast
   ChainNewton<G> newton_;
-  bool linearised_ = false;   ///< in this step
-  double feedback_rate_ = 0;  ///< what feedback left before that
+  bool linearised_ = false;  ///< in this step
+  Past feedback_;            ///< what feedback left before that
 };
 
 }  // namespace hamel::dynamics

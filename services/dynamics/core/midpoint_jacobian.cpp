@@ -93,10 +93,10 @@ template <>
 }
 
 template <class G>
-void MidpointStep<G>::linearise() noexcept {
+void MidpointStep<G>::linearise_and_solve() noexcept {
   Motion H;
   Direction moment;
-  newton_.factorise(X_, [&](int i, const auto& R, Matrix& P) {
+  const auto row_of = [&](int i, const auto& R, Matrix& P) {
     const auto& k = chain_[i];
     const auto& X = X_[at(i)];
     H = H + momentum(k, X, V_[at(i)]);
@@ -105,10 +105,11 @@ void MidpointStep<G>::linearise() noexcept {
     H = to_parent(X, H);
     moment = moment_to_parent(k, X, moment);
     return j;
-  });
+  };
+  newton_.factorise_and_solve(X_, row_of, r_.data(), r_.data());
 }
 
-template void MidpointStep<SE3>::linearise() noexcept;
-template void MidpointStep<SE2>::linearise() noexcept;
+template void MidpointStep<SE3>::linearise_and_solve() noexcept;
+template void MidpointStep<SE2>::linearise_and_solve() noexcept;
 
 }  // namespace hamel::dynamics

@@ -83,15 +83,16 @@ void ChainNewton<G>::eliminate(int i, const Row& row, Matrix& P) noexcept {
 }
 
 template <class G>
-void ChainNewton<G>::solve(const double* r, double* x) noexcept {
-  typename Row::Carried z;
-  for (int i = chain_.n(); i-- > 0;) {
-    const JointFactor& f = factor_[at(i)];
-    const double y = y_[at(i)] = (r[i] - dot(f.l, z)) * f.D_inv;
-    if (i == 0) break;
-    to_parent(f.p, z);
-    z = plus(z, y, f.v);
-  }
+void ChainNewton<G>::inward(int i, double r, typename Row::Carried& z) noexcept {
+  const JointFactor& f = factor_[at(i)];
+  const double y = y_[at(i)] = (r - dot(f.l, z)) * f.D_inv;
+  if (i == 0) return;
+  to_parent(f.p, z);
+  z = plus(z, y, f.v);
+}
+
+template <class G>
+void ChainNewton<G>::outward(double* x) noexcept {
   typename Row::Change S;
   for (int i = 0; i < chain_.n(); ++i) {
     const JointFactor& f = factor_[at(i)];
@@ -99,6 +100,13 @@ void ChainNewton<G>::solve(const double* r, double* x) noexcept {
     if (i > 0) to_child(f.p, S);
     S = plus(S, x[i], f.b);
   }
+}
+
+template <class G>
+void ChainNewton<G>::solve(const double* r, double* x) noexcept {
+  typename Row::Carried z;
+  for (int i = chain_.n(); i-- > 0;) inward(i, r[i], z);
+  outward(x);
 }
 
 template class ChainNewton<SE3>;

@@ -84,15 +84,19 @@ class ChainNewton {
   using Frames = std::vector<typename G::template Frame<double>>;
   explicit ChainNewton(const typename G::Chain& chain);
 
-  /// Asks row_of(i, attitude of link i, P), from the tip, for each joint's row; it also adds K_i to P.
+  /// Asks row_of(i, attitude of link i, P), from the tip, for each joint's row; it also adds K_i to P.  Gives
+  /// x with J x = r as well.  x may be r.
   template <class RowOf>
-  void factorise(const Frames& X, const RowOf& row_of) noexcept {
+  void factorise_and_solve(const Frames& X, const RowOf& row_of, const double* r, double* x) noexcept {
     place(X);
     Matrix P{};
+    typename Row::Carried z;
     for (int i = chain_.n(); i-- > 0;) {
       const Row row = row_of(i, R_[static_cast<std::size_t>(i)], P);
       eliminate(i, row, P);
+      inward(i, r[i], z);
     }
+    outward(x);
   }
   /// x with J x = r.  x may be r.
   void solve(const double* r, double* x) noexcept;
@@ -106,6 +110,8 @@ class ChainNewton {
   };
   void place(const Frames& X) noexcept;
   void eliminate(int i, const Row& row, Matrix& P) noexcept;
+  void inward(int i, double r, typename Row::Carried& z) noexcept;
+  void outward(double* x) noexcept;
 
   const typename G::Chain& chain_;
   std::vector<Attitude> R_;

@@ -1,21 +1,20 @@
 #include "services/dynamics/core/node.h"
 
-#include <cmath>
-
 namespace hamel::dynamics {
 namespace {
 
 /// U = -g . sum m r, the first moment carried from the tip to the world.
 template <class G>
-double potential(const typename G::Chain& chain, const Frames<G>& X) noexcept {
-  typename G::template Direction<double> moment;
-  for (int i = chain.n(); i-- > 0;) {
-    const auto& Xi = X[static_cast<std::size_t>(i)];
-    add_moment(chain[i], Xi, moment);
-    moment = moment_to_parent(chain[i], Xi, moment);
+struct Moment {
+  const typename G::Chain& chain;
+  const typename G::template Frame<double>* X;
+  typename G::template Direction<double> sum{};
+  [[gnu::always_inline]] void operator()(int i) noexcept {
+    add_moment(chain[i], X[i], sum);
+    sum = moment_to_parent(chain[i], X[i], sum);
   }
-  return chain.potential_offset - dot(chain.gravity_W, moment);
-}
+  double potential_J() const noexcept { return chain.potential_offset - dot(chain.gravity_W, sum); }
+};
 
 }  // namespace
 
@@ -33,15 +32,17 @@ template <class G>
 void Node<G>::place(const Chain& chain, const VectorXd& q_new) noexcept {
   q = q_new;
   rbd::place(chain, q.data(), X.data());
-  rbd::factorise<G, double>(chain, X.data(), nullptr, factor.data());
-  potential_J = potential<G>(chain, X);
 }
 
 template <class G>
 void Node<G>::move_with_momentum(const Chain& chain, const VectorXd& p_new) noexcept {
   p = p_new;
-  rbd::solve<G, double>(chain, X.data(), factor.data(), p.data(), scratch_.data(), qd.data());
-  energy_J = 0.5 * p.dot(qd) + potential_J;
+  Moment<G> moment{chain, X.data()};
+  rbd::Inward<G, double> inward{chain, X.data(), factor.data(), p.data(), scratch_.data()};
+  rbd::factorise<G, double>(chain, X.data(), nullptr, factor.data(), [&](int i) { inward(i), moment(i); });
+  rbd::solve_outward<G, double>(chain, X.data(), factor.data(), scratch_.data(), qd.data());
+  kinetic_J = 0.5 * p.dot(qd);
+  energy_J = kinetic_J + moment.potential_J();
 }
 
 template <class G>
@@ -55,13 +56,16 @@ void Node<G>::move_with_velocity(const Chain& chain, const VectorXd& qd_new) noe
     add_along(chain[i], X[s], V, rate[i]);
     momentum_[s] = momentum(chain[i], X[s], V);
   }
+  Moment<G> moment{chain, X.data()};
   for (int i = chain.n(); i-- > 0;) {
     const std::size_t s = static_cast<std::size_t>(i);
     h = h + momentum_[s];
     p.data()[i] = along(chain[i], X[s], h) + chain[i].armature * rate[i];
     h = to_parent(X[s], h);
+    moment(i);
   }
-  energy_J = 0.5 * p.dot(qd) + potential_J;
+  kinetic_J = 0.5 * p.dot(qd);
+  energy_J = kinetic_J + moment.potential_J();
 }
 
 template struct Node<SE3>;

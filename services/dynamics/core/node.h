@@ -29,26 +29,26 @@ bool all_finite(const Numbers& x) noexcept {
   return (a * 0.0).sum() == 0;
 }
 
-/// Configuration, momentum and velocity with the mass matrix factorised there.  place() first, then one of
-/// the others.  Assignments keep the sizes of the constructor: nothing allocates.
+/// Configuration, momentum and velocity.  place() first, then one of the others.  Assignments keep the sizes
+/// of the constructor: nothing allocates.
 template <class G>
 struct Node {
   using Chain = typename G::Chain;
   explicit Node(const Chain& chain);
 
-  /// Frames, factorisation of M(q) and potential energy at q.
+  /// Frames at q.
   void place(const Chain& chain, const VectorXd& q_new) noexcept;
-  /// qd = M^-1 p and the energy.
+  /// Factorises M(q); qd = M^-1 p and the energy.
   void move_with_momentum(const Chain& chain, const VectorXd& p_new) noexcept;
-  /// p = M qd and the energy.
+  /// p = M qd and the energy; M(q) is not factorised.
   void move_with_velocity(const Chain& chain, const VectorXd& qd_new) noexcept;
 
   VectorXd q, p, qd;
   std::vector<double> history;  ///< the tier's own
   Frames<G> X;
-  Factors<G> factor;       ///< of M(q), armature included
-  double potential_J = 0;  ///< U(q)
-  double energy_J = 0;     ///< E = p . qd / 2 + U
+  Factors<G> factor;     ///< of M(q), armature included; of move_with_momentum() alone
+  double kinetic_J = 0;  ///< p . qd / 2
+  double energy_J = 0;   ///< E = p . qd / 2 + U
 
  private:
   VectorXd scratch_;

@@ -32,7 +32,7 @@ StepReport PaperStep<G>::advance(const Node<G>& from, const Load<G>& load, doubl
   if (!report.usable()) return report;
   move(d_);
   for (int i = 0; i < chain_.n(); ++i) report.work_J += force(i, d_[i]) * d_[i];
-  IncrementHistory::push(from, h, 0, d_, to);
+  IncrementHistory::push(from, h, {}, d_, to);
   u_ = from.q + d_;
   to.place(chain_, u_);
   for (int i = 0; i < chain_.n(); ++i) V_[at(i)] = carried(from.X[at(i)], to.X[at(i)], V_[at(i)]);
@@ -118,9 +118,9 @@ void add_columns(const Unit& unit, const Momentum& momentum_of, Matrix& P) {
 /// With X at q^k the twists alone depend on d: the change of a link's momentum is
 ///   (I - (1 - alpha) h (ad_V^T I + d/dV ad_V^T (I V fixed))) (change of V).
 template <>
-void PaperStep<SE3>::linearise() noexcept {
+void PaperStep<SE3>::linearise_and_solve() noexcept {
   const double s = (1 - options_.alpha) * h_;
-  newton_.factorise(from_->X, [&](int i, const lie::Mat3<double>& R, JointRow<SE3>::Matrix& P) {
+  const auto row_of = [&](int i, const lie::Mat3<double>& R, JointRow<SE3>::Matrix& P) {
     const rbd::AxisLink& k = chain_[i];
     const rbd::LinkPose<double>& X = from_->X[at(i)];
     const rbd::Half6<double>& V = V_[at(i)];
@@ -144,12 +144,13 @@ void PaperStep<SE3>::linearise() noexcept {
     for (std::size_t c = 0; c < 6; ++c) j.l.add(c, axis[c]), j.b.add(c, axis[c] / h_);
     j.c = k.armature / h_ + 0.5 * k.damping;
     return j;
-  });
+  };
+  newton_.factorise_and_solve(from_->X, row_of, r_.data(), r_.data());
 }
 template <>
-void PaperStep<SE2>::linearise() noexcept {
+void PaperStep<SE2>::linearise_and_solve() noexcept {
   const double s = (1 - options_.alpha) * h_;
-  newton_.factorise(from_->X, [&](int i, rbd::NoAttitude, JointRow<SE2>::Matrix& P) {
+  const auto row_of = [&](int i, rbd::NoAttitude, JointRow<SE2>::Matrix& P) {
     const rbd::PlanarLink& k = chain_[i];
     const rbd::PlanarFrame<double>& X = from_->X[at(i)];
     const rbd::Half3<double>& V = V_[at(i)];
@@ -169,15 +170,15 @@ void PaperStep<SE2>::linearise() noexcept {
     j.b = plus(j.b, 1 / h_, {{Pair{{A.a, A.l.x}}, Pair{{A.l.y, 0}}}});
     j.c = k.armature / h_ + 0.5 * k.damping;
     return j;
-  });
+  };
+  newton_.factorise_and_solve(from_->X, row_of, r_.data(), r_.data());
 }
 
 /// Eq. (16): q^{k+1} <- q^{k+1} - h^2 M(q^k)^-1 tau_e, or Newton.
 template <class G>
 void PaperStep<G>::correct(VectorXd& d) noexcept {
   if (options_.root == Root::newton) {
-    linearise();
-    newton_.solve(r_.data(), r_.data());
+    linearise_and_solve();
     d -= r_;
     return;
   }

@@ -32,7 +32,7 @@ class PaperStep final : public TierStep<G> {
 
  private:
   void move(const VectorXd& d) noexcept;
-  void linearise() noexcept;
+  void linearise_and_solve() noexcept;
   double force(int i, double d) const noexcept;
   void gather(const Node<G>& node, double share, double sign, VectorXd& p) noexcept;
 
