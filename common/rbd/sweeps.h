@@ -19,7 +19,7 @@ struct Factor {
 /// Articulated-body factorisation of M(q) + diag(extra), O(n).  `extra` may be null.
 /// The parent sees X^T (I^A - U U^T / D) X, U = I^A A, as X^T I^A X - (X^T U)(X^T U)^T / D: nothing but the
 /// last product waits for the division.
-/// Calls then(i) when joint i is done, from the tip: what else runs that way fills the waits.
+/// Calls then(i) when joint i is done, from the tip: what else runs that way needs no pass of its own.
 template <class G, class S, class Then>
 [[gnu::always_inline]] inline void factorise(const typename G::Chain& chain,
                                              const typename G::template Frame<S>* X, const S* extra,
@@ -87,12 +87,13 @@ template <class G, class S>
   for (int i = chain.n(); i-- > 0;) inward(i);
   solve_outward<G, S>(chain, X, f, u, x);
 }
-/// factorise() and solve() in one pass from the tip.
+
+/// factorise() and solve() in one pass from the tip: pays where registers are wide and links few.
 template <class G, class S>
-[[gnu::always_inline]] inline void factorise_and_solve(
-    const typename G::Chain& chain, const typename G::template Frame<S>* X, Factor<G, S>* f, const S* b, S* u,
-    S* x, const typename G::template Motion<S>* wrench = nullptr) noexcept {
-  Inward<G, S> inward{chain, X, f, b, u, wrench};
+[[gnu::always_inline]] inline void factorise_and_solve(const typename G::Chain& chain,
+                                                       const typename G::template Frame<S>* X,
+                                                       Factor<G, S>* f, const S* b, S* u, S* x) noexcept {
+  Inward<G, S> inward{chain, X, f, b, u};
   factorise<G, S>(chain, X, nullptr, f, [&](int i) { inward(i); });
   solve_outward<G, S>(chain, X, f, u, x);
 }
@@ -148,7 +149,8 @@ void forward_dynamics(const typename G::Chain& chain, const double* q, const dou
   place(chain, q, w.X.data());
   motion_wrenches<G, double>(chain, qd, nullptr, w.X.data(), w.F.data());
   for (int i = 0; i < chain.n(); ++i) qdd[i] = tau[i] - chain[i].damping * qd[i];
-  factorise_and_solve<G, double>(chain, w.X.data(), w.factor.data(), qdd, w.u.data(), qdd, w.F.data());
+  factorise<G, double>(chain, w.X.data(), nullptr, w.factor.data());
+  solve<G, double>(chain, w.X.data(), w.factor.data(), qdd, w.u.data(), qdd, w.F.data());
 }
 /// tau = M qdd + c + tau_g, O(n).  tau may be qdd.
 template <class G>

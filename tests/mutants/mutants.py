@@ -65,7 +65,7 @@ MUTANTS = [
     Mutant("infinite_work", "no number that is none", CORE + "marcher.cpp", "if (!std::isfinite(in_play) || !std::isfinite(made_up)) return false;",
            "", "integrator_robustness_test", "Torque*"),
     Mutant("planar_axis", "planar is spatial", "common/rbd/planar_chain.cpp", "axis.z() < 0 ? -1 : 1", "axis.z() < 0 ? 1 : 1", "planar_test", "*Moves*"),
-    Mutant("effort_ignored", "torque is cut at the limit", CORE + "integrator.cpp", "std::clamp(*tau, -limits.effort, limits.effort)", "*tau",
+    Mutant("effort_ignored", "torque is cut at the limit", CORE + "integrator.cpp", "std::clamp(*tau, -limits.effort, limits.effort)", "std::clamp(*tau, -2 * limits.effort, 2 * limits.effort)",
            "integrator_robustness_test", "Limits*"),
     Mutant("stiffer_stops", "stops are no stiffer than said", CORE + "tier.h", "e > 0 ? stiffness * (1 - r * r)", "e > 0 ? stiffness * (1 + r * r)",
            "integrator_robustness_test", "Stops*"),
