@@ -55,6 +55,16 @@ struct Pack {
   [[gnu::always_inline]] friend Pack smaller(Pack a, Pack b) { return {a.v < b.v ? a.v : b.v}; }
 };
 
+/// True when every lane of x is a number below `bound`: halves upon halves.
+template <int W, class Isa>
+[[gnu::always_inline]] inline bool all_below(Pack<W, Isa> x, double bound) noexcept {
+  typename Pack<W, Isa>::Bits below = x.v < bound;
+  if constexpr (W == 8) below &= __builtin_shufflevector(below, below, 4, 5, 6, 7, 0, 1, 2, 3);
+  if constexpr (W == 8) below &= __builtin_shufflevector(below, below, 2, 3, 0, 1, 6, 7, 4, 5);
+  if constexpr (W == 4) below &= __builtin_shufflevector(below, below, 2, 3, 0, 1);
+  return (below[0] & below[1]) != 0;
+}
+
 /// Lanes beyond kReducible, which are rare, are looked up one by one.
 template <int W, class Isa>
 [[gnu::always_inline]] inline void sincos(Pack<W, Isa> x, Pack<W, Isa>& s, Pack<W, Isa>& c) noexcept {
@@ -67,12 +77,9 @@ template <int W, class Isa>
   const Bits a = (Bits)sine.v, b = (Bits)cosine.v, both = (a ^ b) & -(k & 1);
   s.v = (typename P::Lanes)((a ^ both) ^ ((k & 2) << 62));
   c.v = (typename P::Lanes)((b ^ both) ^ (((k + 1) & 2) << 62));
+  if (all_below(abs(x), kReducible)) return;
   double lane[W], sl[W], cl[W];
-  x.store(lane);
-  bool far = false;
-  for (int i = 0; i < W; ++i) far = far || !(__builtin_fabs(lane[i]) < kReducible);
-  if (!far) return;
-  s.store(sl), c.store(cl);
+  x.store(lane), s.store(sl), c.store(cl);
   for (int i = 0; i < W; ++i) {
     if (!(__builtin_fabs(lane[i]) < kReducible)) sl[i] = std::sin(lane[i]), cl[i] = std::cos(lane[i]);
   }

@@ -139,6 +139,12 @@ std::string title(const std::string& what, const std::string& who, int n) {
   return std::string(what).append("/").append(who).append("/").append(std::to_string(n));
 }
 
+/// Steps of ours are timed over whole seconds of motion, enough of them for a time: how many evaluations a
+/// step takes changes on the way, and arms of any length are compared over the same way.
+void whole_seconds(benchmark::internal::Benchmark* steps, int n) {
+  steps->Iterations(1000 * std::max(1, 100 / n));
+}
+
 void add_ours(int n) {
   benchmark::RegisterBenchmark(title("forward", "hamel", n).c_str(), our_forward, n);
   benchmark::RegisterBenchmark(title("inverse", "hamel", n).c_str(), our_inverse, n);
@@ -151,15 +157,17 @@ void add_ours(int n) {
       {"hamel semi_implicit_euler", {.tier = Tier::semi_implicit_euler}}};
   for (auto [name, options] : tiers) {
     options.dt_s = 1e-3;
-    benchmark::RegisterBenchmark(title("step 1 ms", name, n).c_str(), our_step, n, options);
+    whole_seconds(benchmark::RegisterBenchmark(title("step 1 ms", name, n).c_str(), our_step, n, options), n);
   }
 }
 
 void add_planar(int n) {
   for (const scene::Space space : {scene::Space::automatic, scene::Space::se3})
-    benchmark::RegisterBenchmark(
-        title("planar step 1 ms", space == scene::Space::se3 ? "hamel SE(3)" : "hamel SE(2)", n).c_str(),
-        planar_step, n, Options{.dt_s = 1e-3, .space = space});
+    whole_seconds(
+        benchmark::RegisterBenchmark(
+            title("planar step 1 ms", space == scene::Space::se3 ? "hamel SE(3)" : "hamel SE(2)", n).c_str(),
+            planar_step, n, Options{.dt_s = 1e-3, .space = space}),
+        n);
 }
 
 void add_peer(const peers::Maker& maker, int n) {

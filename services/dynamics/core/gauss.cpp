@@ -17,6 +17,11 @@ MatrixXd with_rows(const MatrixXd& a, int rows) {
   for (Eigen::Index i = 0; i < rows; ++i) b.row(i) = a.row(std::min<Eigen::Index>(i, a.rows() - 1));
   return b;
 }
+VectorXd with_zeros(const VectorXd& b, int rows) {
+  VectorXd longer = VectorXd::Zero(rows);
+  longer.head(b.size()) = b;
+  return longer;
+}
 
 }  // namespace
 
@@ -28,12 +33,15 @@ GaussStep<G>::GaussStep(const Chain& chain, const Options& options, Lanes lanes)
       stages_(options.stages),
       padded_(padded(options.stages)),
       a_(with_rows(method_.a, padded_)),
+      extrapolate_(with_rows(method_.extrapolate, padded_)),
+      b_(with_zeros(method_.b, padded_)),
       kernel_(stage_kernel<G>(lanes)),
       stiff_forces_(chain, method_.a),
       contraction_(chain.n()),
       x_{MatrixXd::Zero(padded_, chain.n()), MatrixXd::Zero(padded_, chain.n())},
       next_(x_),
       applied_(x_.V),
+      scale_inv_(x_.V),
       inertia_(VectorXd::Zero(chain.n())),
       u_(inertia_),
       p_next_(inertia_),
@@ -43,9 +51,10 @@ GaussStep<G>::GaussStep(const Chain& chain, const Options& options, Lanes lanes)
   job_.chain = &chain_;
   job_.stop_stiffness = options_.stop_stiffness;
   job_.stages = stages_, job_.padded = padded_;
-  job_.a = a_.data();
+  job_.a = a_.data(), job_.extrapolate = extrapolate_.data();
   job_.inertia = inertia_.data();
   job_.applied = applied_.data();
+  job_.scale_inv = scale_inv_.data();
 }
 
 /// [h, V, F] of the last step, stages of joint 0 first; h = 0: none.
@@ -62,20 +71,27 @@ void GaussStep<G>::remember(const Stages& x, Node<G>& to) const noexcept {
   Eigen::Map<MatrixXd>(to.history.data() + 1 + s * n, s, n) = x.F.topRows(s);
 }
 
-/// The last step's collocation polynomials carried on; the state at rest in its own velocity where there is
-/// none.
+/// The last step's collocation polynomials carried on, by the first evaluation; the state at rest in its own
+/// velocity where there is none.
 template <class G>
 void GaussStep<G>::guess(Stages& x) noexcept {
-  const Eigen::Index s = stages_, n = chain_.n();
-  if (from_->history[0] != h_ || options_.start == Start::previous) {
-    x.V.rowwise() = from_->qd.transpose();
-    x.F.setZero();
+  job_.past = nullptr;
+  if (from_->history[0] == h_ && options_.start != Start::previous) {
+    job_.past = from_->history.data() + 1;
     return;
   }
-  const Eigen::Map<const MatrixXd> V(from_->history.data() + 1, s, n), F(V.data() + V.size(), s, n);
-  x.V.topRows(s).noalias() = method_.extrapolate.lazyProduct(V);
-  x.F.topRows(s).noalias() = method_.extrapolate.lazyProduct(F);
-  for (Eigen::Index j = s; j < padded_; ++j) x.V.row(j) = x.V.row(s - 1), x.F.row(j) = x.F.row(s - 1);
+  x.V.rowwise() = from_->qd.transpose();
+  x.F.setZero();
+}
+
+/// sum b_j x_j over the stages of one joint, two by two.
+template <class G>
+double GaussStep<G>::mean(const double* x) const noexcept {
+  using Pair = lie::Pack<2, lie::Baseline>;
+  const double* b = b_.data();
+  Pair sum{};
+  for (int j = 0; j < padded_; j += 2) sum += Pair::load(b + j) * Pair::load(x + j);
+  return sum.v[0] + sum.v[1];
 }
 
 template <class G>
@@ -84,16 +100,18 @@ void GaussStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noe
   for (int i = 0; i < chain_.n(); ++i) inertia_[i] = 1 / from.factor[at(i)].D_inv;
   job_.load = &load, job_.tau = load.tau.data(), job_.h = h;
   job_.q = from.q.data(), job_.p = from.p.data();
+  job_.rescale = true;
   stiff_ = stiff_forces_.begin(from, h, options_.stop_stiffness);
 }
 
 /// What follows from x is nearer to the root than x by the rate at which the mismatch falls: the residual is
 /// what it would be there.
 template <class G>
-Residual GaussStep<G>::evaluate(const Stages& x) noexcept {
+Residual GaussStep<G>::evaluate(Stages& x) noexcept {
   job_.V = x.V.data(), job_.F = x.F.data();
   job_.V_next = next_.V.data(), job_.F_next = next_.F.data();
   kernel_(job_);
+  job_.rescale = false, job_.past = nullptr;
   const double rate = mismatch_ > 0 ? std::min(1.0, job_.relative / mismatch_) : 1;
   mismatch_ = job_.relative;
   return {job_.torque_Nm, job_.relative * rate};
@@ -116,16 +134,11 @@ StepReport GaussStep<G>::advance(const Node<G>& from, const Load<G>& load, doubl
   if (report.iterations < report.evaluations) correct(x_);  // what follows from x is nearer to the root
   report.evaluations *= stages_;
   if (!report.usable()) return report;
-  const double *V = x_.V.data(), *F = x_.F.data(), *applied = applied_.data(), *b = method_.b.data();
-  for (int i = 0; i < chain_.n(); ++i, V += padded_, F += padded_, applied += padded_) {
-    double dq = 0, dp = 0, work = 0;
-    for (int j = 0; j < stages_; ++j) {
-      dq += b[j] * V[j];
-      dp += b[j] * F[j];
-      work += b[j] * applied[j] * V[j];
-    }
-    u_[i] = from.q[i] + h * dq, p_next_[i] = from.p[i] + h * dp;
-    report.work_J += h * work;
+  applied_.array() *= x_.V.array();  // power
+  for (int i = 0; i < chain_.n(); ++i) {
+    u_[i] = from.q[i] + h * mean(x_.V.col(i).data());
+    p_next_[i] = from.p[i] + h * mean(x_.F.col(i).data());
+    report.work_J += h * mean(applied_.col(i).data());
   }
   remember(x_, to);
   to.place(chain_, u_);

@@ -41,19 +41,21 @@ class GaussStep final : public TierStep<G> {
   bool interpolate(const Node<G>& end, double back, VectorXd& q, VectorXd& p) const noexcept override;
 
   /// The stages that follow from `x`, and how far they are from it.
-  Residual evaluate(const Stages& x) noexcept;
+  Residual evaluate(Stages& x) noexcept;
   void correct(Stages& x) noexcept;
 
  private:
   void begin(const Node<G>& from, const Load<G>& load, double h) noexcept;
   void guess(Stages& x) noexcept;
+  double mean(const double* x) const noexcept;
   void remember(const Stages& x, Node<G>& to) const noexcept;
 
   const Chain& chain_;
   const Options options_;
   const GaussMethod method_;
   const int stages_, padded_;
-  const MatrixXd a_;  ///< method_.a, its last row repeated
+  const MatrixXd a_, extrapolate_;  ///< method_'s, the last row repeated
+  const VectorXd b_;                ///< method_.b, zeros for repeated rows
   const StageKernel<G> kernel_;
   StiffForces<G> stiff_forces_;
   bool stiff_ = false;  ///< this step needs them
@@ -63,7 +65,7 @@ class GaussStep final : public TierStep<G> {
   Contraction contraction_;
   StageJob<G> job_;
   Stages x_, next_;
-  MatrixXd applied_;
+  MatrixXd applied_, scale_inv_;
   VectorXd inertia_, u_, p_next_;  ///< inertia_: A^T I^A A of each joint, what turns rates into momenta
   std::vector<unsigned char> scratch_;
 };

@@ -25,8 +25,12 @@ struct StageJob {
   int stages = 0, padded = 0;
   const double* a = nullptr;  ///< a_ij at [j * padded + i]
   const double *q = nullptr, *p = nullptr;
-  const double* inertia = nullptr;  ///< what turns a joint's rate into momentum
-  const double *V = nullptr, *F = nullptr;
+  const double* inertia = nullptr;      ///< what turns a joint's rate into momentum
+  double* scale_inv = nullptr;          ///< 1 / what a mismatch is measured by
+  bool rescale = true;                  ///< make it, once a step
+  const double* past = nullptr;         ///< V, then F at the last step's stages, unpadded; null: none
+  const double* extrapolate = nullptr;  ///< E_ij at [j * padded + i]: V and F carry `past` on
+  double *V = nullptr, *F = nullptr;
   double *V_next = nullptr, *F_next = nullptr;
   double* applied = nullptr;  ///< torque, damping, stops, wrenches: what does work
   void* scratch = nullptr;

@@ -30,6 +30,23 @@ struct StageScratch {
   }
 };
 
+/// V and F of the stages from `first` by the last step's collocation polynomials.
+template <class G, class P>
+[[gnu::always_inline]] inline void carry_on(const StageJob<G>& job, int first) {
+  const int n = job.chain->n();
+  const double *V_past = job.past, *F_past = V_past + n * job.stages;
+  for (int i = 0; i < n; ++i, V_past += job.stages, F_past += job.stages) {
+    P V{}, F{};
+    for (int j = 0; j < job.stages; ++j) {
+      const P e = P::load(job.extrapolate + j * job.padded + first);
+      V = V + e * V_past[j];
+      F = F + e * F_past[j];
+    }
+    V.store(job.V + i * job.padded + first);
+    F.store(job.F + i * job.padded + first);
+  }
+}
+
 /// Q = q + h a V and P = p + h a F for the stages from `first`.
 template <class G, class P>
 [[gnu::always_inline]] inline void gather(const StageJob<G>& job, int first, const StageScratch<G, P>& w) {
@@ -55,10 +72,11 @@ template <class P>
 /// V = M(Q)^-1 P and F = dL/dq + joint torques for the stages from `first`, and their distance from job's V,
 /// F.
 template <class G, class P>
-[[gnu::always_inline]] inline void evaluate_bundle(StageJob<G>& job, int first, P& torque,
+[[gnu::always_inline]] inline void evaluate_bundle(StageJob<G>& job, int first, P& impulse,
                                                    P& relative) noexcept {
   const auto& chain = *job.chain;
   const int n = chain.n();
+  const double h = job.h;
   const StageScratch<G, P> w(job.scratch, n);
   gather(job, first, w);
   rbd::place(chain, w.Q, w.X);
@@ -89,12 +107,15 @@ template <class G, class P>
     F.store(job.F_next + at);
     // mismatch and scale as momenta: a rate counts with the inertia it moves
     const P off =
-        larger(job.h * abs(F - P::load(job.F + at)), job.inertia[i] * abs(w.rate[i] - P::load(job.V + at)));
-    const P scale = __builtin_fabs(job.p[i]) + abs(w.P_[i]) + job.inertia[i] * abs(w.rate[i]) +
-                    job.h * (abs(F) + k.weight) + kNothing;
+        larger(h * abs(F - P::load(job.F + at)), job.inertia[i] * abs(w.rate[i] - P::load(job.V + at)));
+    if (job.rescale) {
+      const P scale = __builtin_fabs(job.p[i]) + abs(w.P_[i]) + job.inertia[i] * abs(w.rate[i]) +
+                      h * (abs(F) + k.weight) + kNothing;
+      (1.0 / scale).store(job.scale_inv + at);
+    }
     const P poison = (F + w.rate[i]) * 0.0;  // not a number stays not a number
-    torque = larger(torque, off * (1 / job.h)) + poison;
-    relative = larger(relative, off / scale) + poison;
+    impulse = larger(impulse, off) + poison;
+    relative = larger(relative, off * P::load(job.scale_inv + at)) + poison;
     if (i == 0) break;
     H = to_parent(X, H);
     moment = moment_to_parent(k, X, moment);
@@ -103,15 +124,18 @@ template <class G, class P>
 
 template <class G, class P>
 [[gnu::always_inline]] inline void evaluate_stages(StageJob<G>& job) noexcept {
-  P torque{}, relative{};
-  for (int first = 0; first < job.padded; first += P::kWidth) evaluate_bundle(job, first, torque, relative);
-  double t[P::kWidth], r[P::kWidth];
-  torque.store(t), relative.store(r);
-  job.torque_Nm = t[0], job.relative = r[0];
+  P impulse{}, relative{};
+  for (int first = 0; job.past && first < job.padded; first += P::kWidth) carry_on<G, P>(job, first);
+  for (int first = 0; first < job.padded; first += P::kWidth) evaluate_bundle(job, first, impulse, relative);
+  double p[P::kWidth], r[P::kWidth];
+  impulse.store(p), relative.store(r);
+  double largest = p[0];
+  job.relative = r[0];
   for (int i = 1; i < P::kWidth; ++i) {
-    if (!(t[i] <= job.torque_Nm)) job.torque_Nm = t[i];
+    if (!(p[i] <= largest)) largest = p[i];
     if (!(r[i] <= job.relative)) job.relative = r[i];
   }
+  job.torque_Nm = largest / job.h;
 }
 
 }  // namespace hamel::dynamics
