@@ -303,10 +303,7 @@ void DynamicsService::publish_periodic(Time now) {
     publish_status(wire::ServiceState::ready);
     publish_summary(finished());
   }
-  if (checkpoint_ && now - last_sync_ >= 1s) {
-    last_sync_ = now;
-    checkpoint_->sync();
-  }
+  if (checkpoint_) checkpoint_->sync(now);
 }
 
 void DynamicsService::end(Outcome outcome, const std::string& why) {

@@ -22,6 +22,7 @@ struct ServiceConfig {
   std::string state_dir = {};                 ///< checkpoint folder; empty: none
   std::chrono::milliseconds patience{10000};  ///< lockstep: how long to wait for one command
   std::uint64_t incarnation = 0;              ///< of a replayed run; 0: a new one
+  runtime::BootId boot = runtime::boot_id();  ///< a checkpoint of another raises the incarnation
 };
 
 /// How the run ended.
@@ -73,7 +74,7 @@ class DynamicsService final : public runtime::Service {
   void end(Outcome outcome, const std::string& why);
   Result<std::unique_ptr<runtime::Checkpoint>, Problem> open_checkpoint();
   void save();
-  bool load(std::span<const std::byte> bytes);
+  std::string load(std::span<const std::byte> bytes, bool rebooted);
 
   const scene::Scene scene_;
   const ServiceConfig config_;
@@ -108,7 +109,7 @@ class DynamicsService final : public runtime::Service {
 
   std::uint64_t commands_missed_ = 0, deadlines_missed_ = 0, commands_refused_ = 0, outages_ = 0;
   std::uint64_t clock_every_ = 1;
-  Time next_step_{}, last_publish_{}, waiting_since_{}, last_sync_{}, last_poll_{}, young_until_{};
+  Time next_step_{}, last_publish_{}, waiting_since_{}, last_poll_{}, young_until_{};
   bool started_ = false;
   Outcome outcome_ = Outcome::running;
   std::unique_ptr<runtime::Checkpoint> checkpoint_;

@@ -24,6 +24,7 @@ struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
   std::string state_dir = {};  ///< checkpoint folder; empty: none
   std::uint32_t strength = 0;  ///< of several planners for one arm the strongest that is heard drives it
+  runtime::BootId boot = runtime::boot_id();
 };
 
 class PlannerService final : public runtime::Service {
@@ -62,7 +63,7 @@ class PlannerService final : public runtime::Service {
   std::optional<Problem> open_checkpoint();
   void pack_question();
   void save();
-  bool load(std::span<const std::byte> bytes);
+  std::string load(std::span<const std::byte> bytes);
 
   const scene::Scene scene_;
   const ServiceConfig config_;
@@ -98,7 +99,7 @@ class PlannerService final : public runtime::Service {
   wire::PlannerState shown_ = wire::PlannerState::idle;
   wire::Reason shown_reason_ = wire::Reason::none;
   double cycle_s_ = 0;
-  Time last_state_{}, last_report_{}, last_silence_{}, last_sync_{};
+  Time last_state_{}, last_report_{}, last_silence_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
   std::atomic<bool> escape_stop_ = false;  ///< before escape_: outlives the question
