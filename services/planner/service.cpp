@@ -1,7 +1,10 @@
 #include "services/planner/service.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/runtime/options.h"
 #include "common/runtime/realtime.h"
@@ -136,7 +139,7 @@ bool PlannerService::take_states(Time now) {
       ++commands_late_;
     state_ = s;
     have_state_ = true;
-    answered_ = false;
+    if (std::exchange(answered_, false)) unanswered_since_ = now;
   }
   return heard;
 }
@@ -190,7 +193,7 @@ bool PlannerService::answer(Time now) {
     answered_ = true;
     return true;
   }
-  if (lockstep && !view_.covers(state_.t_s)) return false;
+  if (waits_for_obstacles()) return false;
   plan(now);
   answered_ = true;
   fill_command();
@@ -335,6 +338,14 @@ void PlannerService::send_report(Time now) {
   report_out_.publish(report_);
 }
 
+bool PlannerService::waits_for_obstacles() const {
+  return config_.pace == scene::Pace::lockstep && have_state_ && !answered_ && !view_.covers(state_.t_s);
+}
+
+std::string PlannerService::whom_it_waits_for() const {
+  return fmt::format("step {} waits for perception of arm {}", state_.step, scene_.arm);
+}
+
 /// Nothing to plan for: still say so, ten times a second.
 void PlannerService::report_silence(Time now) {
   if (now - last_report_ < 100ms || now - last_silence_ < 100ms) return;
@@ -344,9 +355,10 @@ void PlannerService::report_silence(Time now) {
   if (!have_state_) {
     report_.state = wire::PlannerState::idle;
     report_.detail = "no arm state yet";
-  } else if (lockstep && !answered_) {
+  } else if (waits_for_obstacles()) {
     report_.state = wire::PlannerState::idle;
-    report_.detail = "waiting for the obstacles of this sample time";
+    report_.detail = whom_it_waits_for();
+    if (now - unanswered_since_ > 1s && waits_(now)) spdlog::warn("{}", report_.detail);
   } else if (now - last_state_ > topics::kState.stale && !lockstep) {
     report_.state = wire::PlannerState::unsafe;
     report_.reason = wire::Reason::stale_state;
@@ -360,7 +372,7 @@ void PlannerService::report_silence(Time now) {
 void PlannerService::publish_status(Time now, wire::ServiceState state) {
   presence_.say(now, {.state = state,
                       .incarnation = epoch_,
-                      .detail = wire::to_string(shown_),
+                      .detail = waits_for_obstacles() ? whom_it_waits_for() : wire::to_string(shown_),
                       .counters = {{"cycles", cycles_},
                                    {"commands_late", commands_late_},
                                    {"states_discarded", states_discarded_},

@@ -3,14 +3,12 @@
 #include "common/runtime/checkpoint.h"
 
 #include <gtest/gtest.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "tests/support/folder.h"
+#include "tests/support/said.h"
 
 using hamel::runtime::BootId;
 using hamel::runtime::Checkpoint;
@@ -29,9 +27,6 @@ constexpr BootId kBoot{'o', 'n', 'e'}, kNextBoot{'t', 'w', 'o'};
 
 class CheckpointTest : public testing::Test {
  protected:
-  CheckpointTest() { spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", sink)); }
-  ~CheckpointTest() override { spdlog::set_default_logger(before); }
-
   std::unique_ptr<Checkpoint> open(const BootId& boot = kBoot, std::uint32_t kind = kKind,
                                    std::size_t capacity = kCapacity) {
     auto c = Checkpoint::open(path, kind, capacity, boot);
@@ -66,16 +61,13 @@ class CheckpointTest : public testing::Test {
 
   const hamel::test::Folder folder;
   const std::string path = folder.path() + "/slot", aside = path + ".refused-1";
-  std::ostringstream said;
-  const std::shared_ptr<spdlog::sinks::ostream_sink_mt> sink =
-      std::make_shared<spdlog::sinks::ostream_sink_mt>(said);
-  const std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
+  hamel::test::Said said;
   bool rebooted = false;
 };
 
 TEST_F(CheckpointTest, IsEmptyAtFirst) {
   EXPECT_TRUE(newest(open()).empty());
-  EXPECT_EQ(said.str(), "");
+  EXPECT_EQ(said.all(), "");
 }
 
 TEST_F(CheckpointTest, GivesBackTheLastSavedAfterReopening) {
@@ -100,7 +92,7 @@ TEST_F(CheckpointTest, RefusesWhatDoesNotFit) {
 TEST_F(CheckpointTest, FallsBackToThePreviousWholeSlotWhereverTheLastIsDamaged) {
   for (std::streamoff at = 0; at < 100; ++at) {
     std::filesystem::remove(path);
-    said.str("");
+    said.forget();
     {
       const auto c = open();
       c->save(payload(1, 20));  // sequence 1: second half of the file
@@ -111,7 +103,7 @@ TEST_F(CheckpointTest, FallsBackToThePreviousWholeSlotWhereverTheLastIsDamaged) 
     const bool padding = got == payload(2, 20);  // a byte of no meaning was flipped
     if (!padding) {
       EXPECT_EQ(got, payload(1, 20)) << "byte " << at;
-      EXPECT_NE(said.str(), "") << "byte " << at;
+      EXPECT_NE(said.all(), "") << "byte " << at;
     } else {
       EXPECT_GE(at, 92) << "damage at byte " << at << " went unseen";  // behind the payload
     }
@@ -140,7 +132,7 @@ TEST_F(CheckpointTest, TheCopyStandsInForTwoTornSlots) {
   save_three();
   for (std::streamoff at : {80, 4096 + 80}) flip(path, at);
   EXPECT_EQ(newest(open()), payload(1, 20));
-  EXPECT_NE(said.str().find("a slot is damaged"), std::string::npos) << said.str();
+  EXPECT_TRUE(said.has("a slot is damaged")) << said.all();
 }
 
 TEST_F(CheckpointTest, WhatReachedTheDiskLaterThanTheCopyIsNewer) {
@@ -169,13 +161,13 @@ TEST_F(CheckpointTest, ADiskThatRefusesTheCopyIsNamedAndHoldsNobodyUp) {
     c->sync(std::chrono::steady_clock::now());
     EXPECT_TRUE(c->save(payload(2, 8)));
   }
-  EXPECT_NE(said.str().find("survives a power cut"), std::string::npos) << said.str();
+  EXPECT_TRUE(said.has("survives a power cut")) << said.all();
 }
 
 TEST_F(CheckpointTest, OfAnotherVersionIsRefusedAndKept) {
   open()->save(payload(1, 8));
   EXPECT_TRUE(newest(open(kBoot, kKind + 1)).empty());
-  EXPECT_NE(said.str().find("version (0x7, here 0x8)"), std::string::npos) << said.str();
+  EXPECT_TRUE(said.has("version (0x7, here 0x8)")) << said.all();
   std::filesystem::rename(aside, path);
   EXPECT_EQ(newest(open()), payload(1, 8)) << "whole, where it was kept";
 }
@@ -183,7 +175,7 @@ TEST_F(CheckpointTest, OfAnotherVersionIsRefusedAndKept) {
 TEST_F(CheckpointTest, OfAnotherSizeIsRefusedAndKept) {
   open()->save(payload(1, 8));
   EXPECT_TRUE(newest(open(kBoot, kKind, 8 * kCapacity)).empty());
-  EXPECT_NE(said.str().find("of another size"), std::string::npos) << said.str();
+  EXPECT_TRUE(said.has("of another size")) << said.all();
   std::filesystem::rename(aside, path);
   EXPECT_EQ(newest(open()), payload(1, 8));
 }
@@ -199,7 +191,7 @@ TEST_F(CheckpointTest, WhereTheNewestIsRefusedTheOneBeforeIsTriedAndTheFileKept)
     EXPECT_TRUE(c->load([](std::span<const std::byte> p, bool) {
       return std::string(p[0] == std::byte{2} ? "of another scene" : "");
     }));
-    EXPECT_NE(said.str().find("of another scene: refused"), std::string::npos) << said.str();
+    EXPECT_TRUE(said.has("of another scene: refused")) << said.all();
     c->save(payload(3, 8));
     EXPECT_EQ(newest(*c), payload(3, 8));
   }
