@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <optional>
 
 namespace hamel::runtime {
 
@@ -17,10 +18,13 @@ std::string limit(int which) {
   return l.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(l.rlim_cur);
 }
 
+std::optional<cpu_set_t> processors_before;  // go_realtime(), which comes before any other thread
+
 }  // namespace
 
 Problems go_realtime(const RealtimeOptions& o) {
   Problems problems;
+  if (cpu_set_t set; sched_getaffinity(0, sizeof set, &set) == 0) processors_before = set;
   if (o.cpu >= 0) {
     cpu_set_t set;
     CPU_ZERO(&set);
@@ -44,6 +48,12 @@ Problems go_realtime(const RealtimeOptions& o) {
                                             "LimitRTPRIO=99 in the unit)"});
   }
   return problems;
+}
+
+void go_ordinary() noexcept {
+  const sched_param none{};
+  sched_setscheduler(0, SCHED_OTHER, &none);
+  if (processors_before) sched_setaffinity(0, sizeof *processors_before, &*processors_before);
 }
 
 }  // namespace hamel::runtime

@@ -15,4 +15,8 @@ struct RealtimeOptions {
 /// that mends it.
 Problems go_realtime(const RealtimeOptions& o);
 
+/// The calling thread under the ordinary scheduler, on any processor it could run on before go_realtime():
+/// for threads beside the loop whose work takes long.
+void go_ordinary() noexcept;
+
 }  // namespace hamel::runtime

@@ -11,28 +11,28 @@ namespace hamel::runtime {
 
 namespace {
 
-/// Several services as one.
+/// Several services as one.  Each ends for itself; the others go on.
 class Together final : public Service {
  public:
   explicit Together(std::vector<std::unique_ptr<Service>> all) : all_(std::move(all)) {}
   bool poll(Clock::time_point now) override {
     bool any = false;
-    for (const auto& s : all_) any |= s->poll(now);
+    for (const auto& s : all_)
+      if (!s->finished()) any |= s->poll(now);
     return any;
   }
   Clock::time_point due() const override {
-    auto first = all_[0]->due();
-    for (const auto& s : all_) first = std::min(first, s->due());
+    auto first = Clock::time_point::max();
+    for (const auto& s : all_)
+      if (!s->finished()) first = std::min(first, s->due());
     return first;
   }
   bool finished() const override {
-    const auto failed = [](const auto& s) { return s->finished() && s->exit_code() != kDone; };
-    const auto ended = [](const auto& s) { return s->finished(); };
-    return std::any_of(all_.begin(), all_.end(), failed) || std::all_of(all_.begin(), all_.end(), ended);
+    return std::all_of(all_.begin(), all_.end(), [](const auto& s) { return s->finished(); });
   }
   int exit_code() const override {
     for (const auto& s : all_)
-      if (s->exit_code() != kDone) return s->exit_code();
+      if (s->finished() && s->exit_code() != kDone) return s->exit_code();
     return kDone;
   }
   int readers() const override {

@@ -23,10 +23,10 @@ struct Program {
   std::function<void(RunOptions&)> adjust = {};     ///< what these change of the others, once they are read
 };
 
-/// Runs one service for each scene named, all on one node and one thread, until the first of them to fail, or
-/// all are finished, or a signal.  Returns the exit code: the first that is not kDone.  Never throws: what
-/// escapes is one line on stderr and kFailed.  Tells systemd when it is ready and that it lives, where
-/// NOTIFY_SOCKET asks for it.
+/// Runs one service for each scene named, all on one node and one thread, until all are finished, or a
+/// signal; one that fails holds no other up.  Returns the exit code: the first that is not kDone.  Never
+/// throws: what escapes is one line on stderr and kFailed.  Tells systemd when it is ready and that it lives,
+/// where NOTIFY_SOCKET asks for it.
 int serve(const Program& program, int argc, char** argv) noexcept;
 
 }  // namespace hamel::runtime

@@ -44,7 +44,7 @@ void DynamicsService::take_commands() {
       continue;
     }
     // What was never driven is at rest where the run begins: it starts at once, as in lockstep.
-    if (!command_step_) driven_from_ = step_now() - ramp_steps();
+    if (state_.caused_by.size == 0) driven_from_ = step_now() - ramp_steps();
     command_ = incoming_.torque;
     command_step_ = incoming_.step;
     command_includes_gravity_ = incoming_.includes_gravity;

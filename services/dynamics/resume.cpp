@@ -1,5 +1,8 @@
 /// What a restart of the dynamics service resumes from, and how.
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <limits>
 
 #include "services/dynamics/service.h"
@@ -47,9 +50,9 @@ struct Saved {
 }  // namespace
 
 Result<std::unique_ptr<runtime::Checkpoint>, Problem> DynamicsService::open_checkpoint() {
-  return runtime::Checkpoint::resume(config_.state_dir, "dynamics", scene_.arm, kKind,
-                                     4096 + length(arm_.state().q) * 512,
-                                     [this](std::span<const std::byte> bytes) { return load(bytes); });
+  return runtime::Checkpoint::resume(
+      config_.state_dir, "dynamics", scene_.arm, kKind, 4096 + length(arm_.state().q) * 512, config_.boot,
+      [this](std::span<const std::byte> bytes, bool rebooted) { return load(bytes, rebooted); });
 }
 
 void DynamicsService::save() {
@@ -82,27 +85,34 @@ void DynamicsService::save() {
   checkpoint_->save(packed_);
 }
 
-/// The command in force and whose it is come back too: the arm goes on with it as long as it is fresh.
-bool DynamicsService::load(std::span<const std::byte> bytes) {
+/// The command in force and whose it is come back too: the arm goes on with it as long as it is fresh.  After
+/// a reboot the last steps are lost that others have seen: it is another arm to them, and in real time it
+/// holds until it is driven anew.
+std::string DynamicsService::load(std::span<const std::byte> bytes, bool rebooted) {
   Saved saved;
-  if (!saved.read(bytes) || saved.fingerprint != fingerprint_ || !saved.fits(arm_.state().q.size()))
-    return false;
-  incarnation_ = saved.incarnation;
+  const auto n = arm_.state().q.size();
+  if (!saved.read(bytes)) return "of another size or version";
+  if (!saved.fits(n)) return fmt::format("of an arm of {} joints, not {}", saved.s.q.size(), n);
+  if (saved.fingerprint != fingerprint_) return "of another scene";
+  incarnation_ = rebooted ? std::max(saved.incarnation + 1, incarnation_) : saved.incarnation;
   arm_.restore(saved.s, saved.books, saved.applied, saved.held.size() > 0 ? &saved.held : nullptr);
   hash_.restore(saved.digest);
   if (saved.mode >= 0) mode_ = static_cast<wire::Mode>(saved.mode);
   mode_id_ = saved.mode_id;
   command_ = saved.command;
-  if (saved.command_step != kNone) command_step_ = saved.command_step;
-  if (saved.driven_from != kNotDriven) driven_from_ = saved.driven_from;
-  epoch_ = saved.epoch;
-  owner_ = saved.owner;
+  if (!rebooted || config_.pace == scene::Pace::lockstep) {
+    if (saved.command_step != kNone) command_step_ = saved.command_step;
+    if (saved.driven_from != kNotDriven) driven_from_ = saved.driven_from;
+    epoch_ = saved.epoch;
+    owner_ = saved.owner;
+  }
   planner_state_ = static_cast<wire::PlannerState>(saved.planner_state);
   validity_ = static_cast<wire::Validity>(saved.validity);
   command_includes_gravity_ = saved.gravity != 0;
   state_.caused_by = saved.causes;
-  spdlog::info("resumed at step {} (t = {:.3f} s)", arm_.state().step, arm_.t_s());
-  return true;
+  spdlog::info("resumed at step {} (t = {:.3f} s){}", arm_.state().step, arm_.t_s(),
+               rebooted ? fmt::format(", after a reboot: incarnation {}", incarnation_) : "");
+  return {};
 }
 
 }  // namespace hamel::dynamics

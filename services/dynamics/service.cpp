@@ -78,6 +78,7 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
       command_in_(node),
       mode_in_(node),
       clock_in_(node),
+      status_in_(node),
       presence_(node, wire::ServiceKind::dynamics, scene.arm) {
   const double dt = scene.dynamics.dt_s;
   last_step_ = static_cast<std::uint64_t>(std::llround(scene.duration_s / dt));
@@ -154,12 +155,14 @@ bool DynamicsService::poll_lockstep(Time now) {
     progressed = true;
   }
   if (progressed) return true;
+  hear_planner(now);
   if (now - waiting_since_ > 1s && refusals_(now))
-    spdlog::warn("step {} waits for the planner of arm {}, {:.0f} s so far", arm_.state().step, scene_.arm,
-                 std::chrono::duration<double>(now - waiting_since_).count());
+    spdlog::warn("step {} waits for the planner of arm {}, {:.0f} s so far{}", arm_.state().step, scene_.arm,
+                 std::chrono::duration<double>(now - waiting_since_).count(), planner_waits());
   if (now - waiting_since_ > config_.patience) {
-    end(Outcome::no_command, fmt::format("no planner answered step {} within {} s", arm_.state().step,
-                                         std::chrono::duration<double>(config_.patience).count()));
+    end(Outcome::no_command,
+        fmt::format("no planner answered step {} within {} s{}", arm_.state().step,
+                    std::chrono::duration<double>(config_.patience).count(), planner_waits()));
     return true;
   }
   if (now - last_publish_ >= kRepeat) {
@@ -168,6 +171,21 @@ bool DynamicsService::poll_lockstep(Time now) {
     publish_state();
   }
   return false;
+}
+
+/// What the planner of this arm says that it waits for: a status it has twice a second.
+void DynamicsService::hear_planner(Time now) {
+  wire::ServiceStatus s;
+  for (int i = 0; i < kBurst && status_in_.take(s); ++i) {
+    if (s.kind != wire::ServiceKind::planner || s.arm != scene_.arm) continue;
+    planner_says_ = s.detail;
+    planner_said_ = now;
+  }
+}
+
+std::string DynamicsService::planner_waits() const {
+  if (planner_said_ < waiting_since_ + 1s || planner_says_.find("waits for") == std::string::npos) return "";
+  return "; it says: " + planner_says_;
 }
 
 bool DynamicsService::poll_realtime(Time now) {
@@ -303,10 +321,7 @@ void DynamicsService::publish_periodic(Time now) {
     publish_status(wire::ServiceState::ready);
     publish_summary(finished());
   }
-  if (checkpoint_ && now - last_sync_ >= 1s) {
-    last_sync_ = now;
-    checkpoint_->sync();
-  }
+  if (checkpoint_) checkpoint_->sync(now);
 }
 
 void DynamicsService::end(Outcome outcome, const std::string& why) {

@@ -22,6 +22,7 @@ struct ServiceConfig {
   std::string state_dir = {};                 ///< checkpoint folder; empty: none
   std::chrono::milliseconds patience{10000};  ///< lockstep: how long to wait for one command
   std::uint64_t incarnation = 0;              ///< of a replayed run; 0: a new one
+  runtime::BootId boot = runtime::boot_id();  ///< a checkpoint of another raises the incarnation
 };
 
 /// How the run ended.
@@ -56,6 +57,8 @@ class DynamicsService final : public runtime::Service {
   std::int64_t step_now() const { return static_cast<std::int64_t>(arm_.state().step); }
   std::int64_t ramp_steps() const;
   bool poll_lockstep(Time now);
+  std::string planner_waits() const;
+  void hear_planner(Time now);
   bool poll_realtime(Time now);
   void count_lateness(Time now);
   bool owner_is_silent() const;
@@ -73,7 +76,7 @@ class DynamicsService final : public runtime::Service {
   void end(Outcome outcome, const std::string& why);
   Result<std::unique_ptr<runtime::Checkpoint>, Problem> open_checkpoint();
   void save();
-  bool load(std::span<const std::byte> bytes);
+  std::string load(std::span<const std::byte> bytes, bool rebooted);
 
   const scene::Scene scene_;
   const ServiceConfig config_;
@@ -90,6 +93,7 @@ class DynamicsService final : public runtime::Service {
   wire::Subscription<wire::TorqueCommand> command_in_;
   wire::Subscription<wire::ModeCommand> mode_in_;
   wire::Subscription<wire::SimulationClock> clock_in_;
+  wire::Subscription<wire::ServiceStatus> status_in_;
   runtime::Presence presence_;
 
   wire::ArmState state_;
@@ -98,6 +102,8 @@ class DynamicsService final : public runtime::Service {
   std::optional<std::uint64_t> command_step_;  ///< the state step it answers; none: no command yet
   bool command_includes_gravity_ = false;
   wire::PlannerState planner_state_ = wire::PlannerState::idle;
+  std::string planner_says_;  ///< lockstep: the detail of its newest status
+  Time planner_said_{};
   std::uint64_t epoch_ = 0;
   bus::WriterId owner_{};  ///< of the planner that drives the arm
   /// The step at which its ramp out of a hold began; a run's first command has its ramp behind it.
@@ -108,7 +114,7 @@ class DynamicsService final : public runtime::Service {
 
   std::uint64_t commands_missed_ = 0, deadlines_missed_ = 0, commands_refused_ = 0, outages_ = 0;
   std::uint64_t clock_every_ = 1;
-  Time next_step_{}, last_publish_{}, waiting_since_{}, last_sync_{}, last_poll_{}, young_until_{};
+  Time next_step_{}, last_publish_{}, waiting_since_{}, last_poll_{}, young_until_{};
   bool started_ = false;
   Outcome outcome_ = Outcome::running;
   std::unique_ptr<runtime::Checkpoint> checkpoint_;

@@ -1,5 +1,7 @@
 /// What a restart of the planner service resumes from, and how.
 
+#include <fmt/format.h>
+
 #include "services/planner/service.h"
 
 namespace hamel::planner {
@@ -115,8 +117,9 @@ bool get(runtime::Unpacker& u, EscapeQuestion& q) {
 
 std::optional<Problem> PlannerService::open_checkpoint() {
   if (config_.state_dir.empty()) return {};
-  auto c = runtime::Checkpoint::resume(config_.state_dir, "planner", scene_.arm, kKind, kCapacity,
-                                       [this](std::span<const std::byte> bytes) { return load(bytes); });
+  auto c =
+      runtime::Checkpoint::resume(config_.state_dir, "planner", scene_.arm, kKind, kCapacity, config_.boot,
+                                  [this](std::span<const std::byte> bytes, bool) { return load(bytes); });
   if (!c) return c.error();
   checkpoint_ = std::move(c).value();
   packed_.reserve(kCapacity);
@@ -153,7 +156,8 @@ void PlannerService::save() {
   checkpoint_->save(packed_);
 }
 
-bool PlannerService::load(std::span<const std::byte> bytes) {
+/// After a reboot as after a kill: what is too old for the arm's step by then is ramped in.
+std::string PlannerService::load(std::span<const std::byte> bytes) {
   runtime::Unpacker u(bytes);
   std::uint64_t print = 0, epoch = 0, incarnation = 0, step = 0, mode_id = 0;
   std::int64_t mode = -1;
@@ -166,7 +170,10 @@ bool PlannerService::load(std::span<const std::byte> bytes) {
                      u.get(mode_id) && get(u, goal) && u.get(*memory) && u.get(last.step) &&
                      u.get(last_state) && u.get_doubles(last.torque) && u.get(last.caused_by) &&
                      u.get(waiting) && (waiting == 0 || get(u, question_)) && u.at_end();
-  if (!whole || print != fingerprint_ || last.torque.size() != q_.size()) return false;
+  if (!whole) return "of another size or version";
+  if (last.torque.size() != q_.size())
+    return fmt::format("of an arm of {} joints, not {}", last.torque.size(), q_.size());
+  if (print != fingerprint_) return "of another scene";
   epoch_ = (std::uint64_t{config_.strength} << 32) + (epoch & 0xffffffff) + 1;
   incarnation_ = incarnation;
   view_.begin(incarnation);
@@ -186,7 +193,7 @@ bool PlannerService::load(std::span<const std::byte> bytes) {
   planner_.restore(*memory);
   if (waiting != 0) start_escape();
   spdlog::info("resumed at step {} with goal {}", step, goal_ ? goal_->id : 0);
-  return true;
+  return {};
 }
 
 }  // namespace hamel::planner

@@ -1,9 +1,13 @@
 #include "services/planner/service.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/runtime/options.h"
+#include "common/runtime/realtime.h"
 #include "services/planner/convert.h"
 
 namespace hamel::planner {
@@ -14,7 +18,7 @@ namespace {
 
 constexpr auto kArmHeard = 200ms;  // an arm speaks at least each 100 ms: so long no other is heard
 constexpr std::uint32_t kArmBits = 0x0fffffff;  // of an obstacle source: the arm it sees for
-constexpr double kMemoryFresh_s = 0.2;          // realtime: older memory is ramped in again
+constexpr double kMemoryFresh_s = 0.2;          // older memory is ramped in again
 constexpr double kLeapSlack = 1e-3;             // rad or m that a sample may be off without being wrong
 constexpr int kLeapsBelieved = 3;               // so many leaps in a row are passed over
 constexpr auto kReportPeriod = 10ms;            // realtime: a report each, and one at every change of state
@@ -60,10 +64,7 @@ bool PlannerService::poll(Time now) {
   const bool planned = answer(now);
   if (!planned) report_silence(now);
   if (presence_.due(now)) publish_status(now, wire::ServiceState::ready);
-  if (checkpoint_ && now - last_sync_ >= 1s) {
-    last_sync_ = now;
-    checkpoint_->sync();
-  }
+  if (checkpoint_) checkpoint_->sync(now);
   return heard || planned;
 }
 
@@ -124,9 +125,11 @@ bool PlannerService::take_states(Time now) {
         spdlog::warn("another arm {} speaks on this domain (an earlier run?); not heard", s.arm);
       continue;
     }
+    const bool same = have_state_ && from == arm_writer_ && s.incarnation == state_.incarnation;
     arm_writer_ = from;
     heard = true;
     last_state_ = now;
+    if (same && s.step < state_.step) continue;  // overtaken on its way
     if (incarnation_ != s.incarnation) meet(s);
     // In lockstep the same state again means that our answer was lost: answer it again.
     if (!cadence_.due(s.step, s.position, s.velocity)) continue;
@@ -136,7 +139,7 @@ bool PlannerService::take_states(Time now) {
       ++commands_late_;
     state_ = s;
     have_state_ = true;
-    answered_ = false;
+    if (std::exchange(answered_, false)) unanswered_since_ = now;
   }
   return heard;
 }
@@ -190,7 +193,7 @@ bool PlannerService::answer(Time now) {
     answered_ = true;
     return true;
   }
-  if (lockstep && !view_.covers(state_.t_s)) return false;
+  if (waits_for_obstacles()) return false;
   plan(now);
   answered_ = true;
   fill_command();
@@ -211,16 +214,15 @@ void PlannerService::plan(Time now) {
   obstacle_age_s_ = view_.at(state_.t_s, q_, command_.caused_by);
   if (goal_) command_.caused_by.add(wire::ServiceKind::client, goal_->id);
 
-  if (config_.pace == scene::Pace::realtime) {
-    const double passed_s =
-        memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
-    const bool lost = !memory_step_ || *memory_step_ > state_.step || passed_s > kMemoryFresh_s;
-    // An arm that nobody has driven yet waits at rest for the run to begin: as in lockstep, at once.
-    const bool untouched = state_.validity == wire::Validity::holding && state_.caused_by.size == 0;
-    if (lost && !untouched) planner_.ramp_in();
-  }
   const bool lockstep = config_.pace == scene::Pace::lockstep;  // waits as long as it takes: nothing ages
   const double period_s = static_cast<double>(scene_.planner.period_steps) * state_.dt_s;
+  const double passed_s =
+      memory_step_ ? static_cast<double>(state_.step - *memory_step_) * state_.dt_s : scene::kInf;
+  const bool lost =
+      !memory_step_ || *memory_step_ > state_.step || passed_s > std::max(kMemoryFresh_s, 3 * period_s);
+  // An arm that nobody has driven yet waits at rest for the run to begin: at once.
+  const bool untouched = state_.validity == wire::Validity::holding && state_.caused_by.size == 0;
+  if (lost && !untouched) planner_.ramp_in();
   const Input in{.step = state_.step,
                  .t_s = state_.t_s,
                  .dt_s = period_s,
@@ -261,6 +263,7 @@ void PlannerService::start_escape() {
   escape_due_ = question_.step + planner_.escape_steps(scene_.dynamics.dt_s);
   escape_stop_ = false;
   escape_ = std::async(std::launch::async, [this, question = question_] {
+    runtime::go_ordinary();  // many cycles' work: beside the loop, not before it
     return find_escape(scene_.robot, scene_.planner, question, [this] { return escape_stop_.load(); });
   });
 }
@@ -335,6 +338,14 @@ void PlannerService::send_report(Time now) {
   report_out_.publish(report_);
 }
 
+bool PlannerService::waits_for_obstacles() const {
+  return config_.pace == scene::Pace::lockstep && have_state_ && !answered_ && !view_.covers(state_.t_s);
+}
+
+std::string PlannerService::whom_it_waits_for() const {
+  return fmt::format("step {} waits for perception of arm {}", state_.step, scene_.arm);
+}
+
 /// Nothing to plan for: still say so, ten times a second.
 void PlannerService::report_silence(Time now) {
   if (now - last_report_ < 100ms || now - last_silence_ < 100ms) return;
@@ -344,9 +355,10 @@ void PlannerService::report_silence(Time now) {
   if (!have_state_) {
     report_.state = wire::PlannerState::idle;
     report_.detail = "no arm state yet";
-  } else if (lockstep && !answered_) {
+  } else if (waits_for_obstacles()) {
     report_.state = wire::PlannerState::idle;
-    report_.detail = "waiting for the obstacles of this sample time";
+    report_.detail = whom_it_waits_for();
+    if (now - unanswered_since_ > 1s && waits_(now)) spdlog::warn("{}", report_.detail);
   } else if (now - last_state_ > topics::kState.stale && !lockstep) {
     report_.state = wire::PlannerState::unsafe;
     report_.reason = wire::Reason::stale_state;
@@ -360,7 +372,7 @@ void PlannerService::report_silence(Time now) {
 void PlannerService::publish_status(Time now, wire::ServiceState state) {
   presence_.say(now, {.state = state,
                       .incarnation = epoch_,
-                      .detail = wire::to_string(shown_),
+                      .detail = waits_for_obstacles() ? whom_it_waits_for() : wire::to_string(shown_),
                       .counters = {{"cycles", cycles_},
                                    {"commands_late", commands_late_},
                                    {"states_discarded", states_discarded_},

@@ -24,6 +24,7 @@ struct ServiceConfig {
   scene::Pace pace = scene::Pace::lockstep;
   std::string state_dir = {};  ///< checkpoint folder; empty: none
   std::uint32_t strength = 0;  ///< of several planners for one arm the strongest that is heard drives it
+  runtime::BootId boot = runtime::boot_id();
 };
 
 class PlannerService final : public runtime::Service {
@@ -56,13 +57,15 @@ class PlannerService final : public runtime::Service {
   void take_escape();
   void fill_command();
   void publish_report(Time now, bool always);
+  bool waits_for_obstacles() const;
+  std::string whom_it_waits_for() const;
   void report_silence(Time now);
   void send_report(Time now);
   void publish_status(Time now, wire::ServiceState state);
   std::optional<Problem> open_checkpoint();
   void pack_question();
   void save();
-  bool load(std::span<const std::byte> bytes);
+  std::string load(std::span<const std::byte> bytes);
 
   const scene::Scene scene_;
   const ServiceConfig config_;
@@ -90,15 +93,16 @@ class PlannerService final : public runtime::Service {
   Eigen::VectorXd q_, qd_;
 
   bool have_state_ = false, answered_ = true;  ///< answered: the newest state has its command
-  std::optional<std::uint64_t> incarnation_;   ///< of the arm we know
-  bus::WriterId arm_writer_{};                 ///< who speaks for it
-  std::optional<std::uint64_t> memory_step_;   ///< the step our memory stands at
+  Time unanswered_since_{};
+  std::optional<std::uint64_t> incarnation_;  ///< of the arm we know
+  bus::WriterId arm_writer_{};                ///< who speaks for it
+  std::optional<std::uint64_t> memory_step_;  ///< the step our memory stands at
   std::optional<wire::Mode> mode_;
   std::uint64_t mode_id_ = 0, commands_late_ = 0, cycles_ = 0;
   wire::PlannerState shown_ = wire::PlannerState::idle;
   wire::Reason shown_reason_ = wire::Reason::none;
   double cycle_s_ = 0;
-  Time last_state_{}, last_report_{}, last_silence_{}, last_sync_{};
+  Time last_state_{}, last_report_{}, last_silence_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
   std::atomic<bool> escape_stop_ = false;  ///< before escape_: outlives the question
@@ -106,7 +110,7 @@ class PlannerService final : public runtime::Service {
   EscapeQuestion question_;
   std::vector<std::byte> packed_question_;
   std::uint64_t escape_due_ = 0;
-  runtime::RateLimit refusals_;
+  runtime::RateLimit refusals_, waits_;
   int leaps_in_a_row_ = 0;
   std::uint64_t states_discarded_ = 0;
 };

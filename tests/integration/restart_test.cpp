@@ -22,15 +22,19 @@ using namespace std::chrono_literals;
 
 namespace {
 
+/// Two starts of a machine.
+constexpr runtime::BootId kBoot{'o', 'n', 'e'}, kNextBoot{'t', 'w', 'o'};
+
 /// Runs a scene in lockstep to `until`, all services new, with checkpoints in `folder`.
-wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain) {
+wire::RunSummary run_to(double until_s, const std::string& folder, std::uint32_t domain,
+                        const runtime::BootId& boot = kBoot) {
   const auto n = node(domain);
   scene::Scene s = four_link({"planner.method=gyro"});
   s.duration_s = until_s;
   wire::Subscription<wire::RunSummary> summaries(*n);
-  auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder});
+  auto arm = dynamics::DynamicsService::make(*n, s, {.state_dir = folder, .boot = boot});
   auto eyes = perception::PerceptionService::make(*n, s);
-  auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder});
+  auto brain = planner::PlannerService::make(*n, s, {.state_dir = folder, .boot = boot});
   EXPECT_TRUE(arm && eyes && brain);
   const auto deadline = Clock::now() + 60s;
   while (!arm.value()->finished() && Clock::now() < deadline) {
@@ -55,6 +59,72 @@ TEST(Restart, InLockstepContinuesBitForBit) {
   EXPECT_EQ(resumed.steps, 1000u);
   EXPECT_EQ(resumed.trajectory_hash, whole.trajectory_hash);
   EXPECT_EQ(resumed.energy_drift_rel, whole.energy_drift_rel);
+}
+
+/// The arm's machine loses power at 0.4 s; its disk knows the arm as it was at 0.2 s.
+void lose_power(const std::string& folder, std::uint32_t domain) {
+  const std::string file = folder + "/dynamics-1.checkpoint";
+  (void)run_to(0.2, folder, domain);
+  std::filesystem::copy_file(file, file + ".old");
+  (void)run_to(0.4, folder, domain);
+  std::filesystem::rename(file + ".old", file);
+  std::filesystem::remove(file + ".durable");
+}
+
+TEST(Restart, AfterAPowerCutTheArmIsAnotherOneToItsPeersInLockstep) {
+  const test::Folder folder;
+  lose_power(folder.path(), 17);
+  const auto resumed = run_to(1.0, folder.path(), 18, kNextBoot);
+  EXPECT_EQ(resumed.incarnation, 2u);
+  EXPECT_EQ(resumed.steps, 1000u);
+  const auto again = run_to(1.1, folder.path(), 19, kNextBoot);
+  EXPECT_EQ(again.incarnation, 2u) << "killed, not rebooted";
+}
+
+/// Real time over `seconds`, the test gives it: the states that were said.
+std::vector<wire::ArmState> run_realtime(const scene::Scene& s, const std::string& folder, double seconds,
+                                         const runtime::BootId& boot, std::uint32_t domain) {
+  const auto n = node(domain);
+  wire::Subscription<wire::ArmState> states(*n);
+  auto now = Clock::now();
+  auto arm = made(dynamics::DynamicsService::make(
+      *n, s, {.pace = scene::Pace::realtime, .state_dir = folder, .boot = boot}));
+  auto eyes = std::move(perception::PerceptionService::make(*n, s)).value();
+  auto brain = made(planner::PlannerService::make(
+      *n, s, {.pace = scene::Pace::realtime, .state_dir = folder, .boot = boot}));
+  std::vector<wire::ArmState> all;
+  for (int ms = 0; ms < static_cast<int>(1000 * seconds); ++ms) {
+    arm->poll(now += 1ms);
+    eyes->poll(now);
+    brain->poll(now);
+    for (wire::ArmState one; states.take(one);) all.push_back(one);
+  }
+  return all;
+}
+
+TEST(Restart, AfterAPowerCutTheArmIsAnotherOneToItsPeersInRealTime) {
+  const test::Folder folder;
+  const std::string file = folder.path() + "/dynamics-1.checkpoint";
+  const scene::Scene s = four_link({"planner.method=gyro", "duration_s=60"});
+  const auto first = run_realtime(s, folder.path(), 1, kBoot, 20);
+  std::filesystem::copy_file(file, file + ".old");
+  const auto lost = run_realtime(s, folder.path(), 1, kBoot, 21);
+  EXPECT_EQ(lost.back().incarnation, first.back().incarnation) << "killed, not rebooted";
+  std::filesystem::rename(file + ".old", file);
+  std::filesystem::remove(file + ".durable");
+  const auto after = run_realtime(s, folder.path(), 2, kNextBoot, 22);
+  EXPECT_GT(after.front().incarnation, lost.back().incarnation);
+  EXPECT_EQ(after.front().step, first.back().step) << "from where the disk knows it";
+  EXPECT_EQ(after.front().position, first.back().position);
+  EXPECT_EQ(after.back().validity, wire::Validity::valid) << "and it is driven again";
+  EXPECT_NE(after[1].validity, wire::Validity::valid) << "no command of before the cut is obeyed";
+  double jump = 0, most = 0;
+  for (std::size_t k = 2; k < after.size(); ++k) {
+    const double change = (after[k].torque_applied - after[k - 1].torque_applied).lpNorm<Eigen::Infinity>();
+    if (k < 200) jump = std::max(jump, change);  // the ramp; the method's own changes are larger
+    most = std::max(most, after[k].torque_applied.lpNorm<Eigen::Infinity>());
+  }
+  EXPECT_LE(jump, 0.1 * most) << "over a ramp";
 }
 
 // Whoever listens must not see a restart in what is said: the torque that was applied least of all.
@@ -203,13 +273,17 @@ TEST_F(Checkpoints, OfAnotherSceneAreRefusedByThePlanner) {
   EXPECT_EQ(epoch_of(four_link()), 1u);
   EXPECT_EQ(epoch_of(four_link()), 2u) << "resumed: the next epoch";
   EXPECT_EQ(epoch_of(four_link({"planner.kp=26"})), 1u) << "another scene: afresh";
+  std::filesystem::rename(folder.path() + "/planner-1.checkpoint.refused-1",
+                          folder.path() + "/planner-1.checkpoint");
+  EXPECT_EQ(epoch_of(four_link()), 3u) << "what was refused was kept";
 }
 
 TEST_F(Checkpoints, OfTheDynamicsKeepThePlaceThatIsHeld) {
   const scene::Scene s = four_link({"gravity_mps2=[0, -9.81, 0]"});
   Eigen::VectorXd whole, resumed;
   for (const bool restart : {false, true}) {
-    std::filesystem::remove(folder.path() + "/dynamics-1.checkpoint");
+    for (const char* of : {"", ".durable"})
+      std::filesystem::remove(folder.path() + "/dynamics-1.checkpoint" + of);
     const auto n = node(29);
     auto now = Clock::now();
     const dynamics::ServiceConfig config{.pace = scene::Pace::realtime, .state_dir = folder.path()};

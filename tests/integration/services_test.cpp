@@ -4,9 +4,11 @@
 
 #include <cstring>
 
+#include "common/runtime/options.h"
 #include "services/dynamics/service.h"
 #include "services/planner/obstacle_view.h"
 #include "services/planner/service.h"
+#include "tests/support/said.h"
 #include "tests/support/services.h"
 
 using namespace hamel;
@@ -85,6 +87,48 @@ TEST(Lockstep, WithoutAPlannerTheRunEndsAndSaysSo) {
   }
   EXPECT_EQ(arm.value()->outcome(), dynamics::Outcome::no_command);
   EXPECT_EQ(arm.value()->arm().state().step, 0u);
+}
+
+// The planner is there and waits itself: who ends the run must name whom it lacks.
+TEST(Lockstep, WithoutAPerceptionTheRunEndsAndNamesIt) {
+  test::Said said;
+  const auto n = node(15);
+  const scene::Scene s = test::four_link();
+  auto arm = made(dynamics::DynamicsService::make(*n, s, {.patience = 4s}));
+  auto brain = made(planner::PlannerService::make(*n, s, {}));
+  wire::Subscription<wire::PlannerReport> reports(*n);
+  wire::PlannerReport r;
+  for (auto now = Clock::now(); !arm->finished(); now += 10ms) {
+    brain->poll(now);
+    arm->poll(now);
+    while (reports.take(r)) {
+    }
+  }
+  EXPECT_EQ(arm->exit_code(), runtime::kNoData);
+  const std::string waits = "step 0 waits for perception of arm 1";
+  EXPECT_EQ(r.detail, waits);
+  EXPECT_TRUE(said.has("[warning] " + waits)) << said.all();
+  EXPECT_TRUE(said.has("step 0 waits for the planner of arm 1, 2 s so far; it says: " + waits) ||
+              said.has("step 0 waits for the planner of arm 1, 3 s so far; it says: " + waits))
+      << said.all();
+  EXPECT_TRUE(said.has("no planner answered step 0 within 4 s; it says: " + waits)) << said.all();
+}
+
+TEST(Dynamics, CountsThePeriodsThatItWasStopped) {
+  const auto n = node(16);
+  wire::Subscription<wire::RunSummary> summaries(*n);
+  auto arm = made(dynamics::DynamicsService::make(*n, test::four_link(), {.pace = scene::Pace::realtime}));
+  auto now = Clock::now();
+  for (int i = 0; i < 100; ++i) arm->poll(now += 1ms);
+  const auto before = arm->arm().state().step;
+  for (int i = 0; i < 100; ++i) arm->poll(now += i == 50 ? 300ms : 1ms);
+  arm->close();
+  wire::RunSummary last;
+  while (summaries.take(last)) {
+  }
+  EXPECT_EQ(before, 100u);
+  EXPECT_EQ(last.steps, 200u) << "what was missed is not made up for in a burst";
+  EXPECT_EQ(last.deadlines_missed, 299u);
 }
 
 TEST(Dynamics, RefusesCommandsOfTheWrongSizeIncarnationOrEpoch) {
