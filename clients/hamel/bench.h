@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/hamel/bench_reduce.h"
+
 namespace hamel::client {
 
 struct BenchArgs {
@@ -38,7 +40,8 @@ class BenchVerb {
 
  private:
   BenchArgs args_;
-  CLI::App* planner_ = nullptr;
+  BenchReduceArgs reduce_args_;
+  CLI::App *planner_ = nullptr, *reduce_ = nullptr;
 };
 
 }  // namespace hamel::client

@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "clients/hamel/bench_lockstep.h"
 #include "clients/hamel/bench_ping.h"
+#include "clients/hamel/shipped.h"
 
 namespace hamel::client {
 
@@ -152,13 +152,6 @@ Json jitter(bool busy, const BenchBusArgs& args) {
           {"deadlines_missed", missed}};
 }
 
-std::string find_scene() {
-  const auto here = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-  for (const char* at : {"../share/hamel/scenes", "../../../deploy/scenes"})
-    if (const auto p = here / at / "four_link_avoid.textproto"; std::filesystem::exists(p)) return p.string();
-  return "";
-}
-
 Json lockstep(Vendor vendor, int processes, const std::string& scene, const BenchBusArgs& args) {
   const auto flat_out = [&] {
     const Times t = bare_udp(args.samples, 0);
@@ -189,7 +182,7 @@ void latency(const BenchBusArgs& args, Json& rows) {
 }
 
 void lockstep(const BenchBusArgs& args, Json& rows) {
-  const std::string scene = find_scene();
+  const std::string scene = shipped_scene("four_link_avoid");
   if (scene.empty()) {
     fmt::print(stderr, "hamel bench bus: four_link_avoid is not installed: no lockstep\n");
     return;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "clients/hamel/ticks.h"
+#include "clients/hamel/trade_choice.h"
 #include "common/base/text.h"
 #include "common/rbd/planar_chain.h"
 
@@ -16,9 +17,7 @@ namespace {
 using scene::Tier;
 using trade::kSamples;
 
-constexpr int kHalvings = 5;         // of a steered reference's step
-constexpr double kBetween = 2;       // an error between two instants, of the largest at one
-constexpr double kRounding = 1e-13;  // what a run adds up to [rad or m], at the least
+constexpr int kHalvings = 5;  // of a steered reference's step
 constexpr double kShortRun_s = 0.05;
 
 /// What an evaluation usually takes [us]: a fixed part and one for each joint, measured on one core; gauss
@@ -110,6 +109,7 @@ Converged converge_steered(const scene::Scene& scene, const trade::Watch& watch)
   Path coarse = follow(s, best.horizon_s, watch);
   for (int k = 0; k < kHalvings && !watch.stop(); ++k) {
     s.dynamics.dt_s /= 2;
+    watch.say("reference: midpoint and planner each " + text(s.dynamics.dt_s) + " s");
     Path fine = follow(s, best.horizon_s, watch);
     const double off = apart(coarse.q, fine.q);
     const bool better = fine.setting.finished && off < best.uncertainty;
@@ -134,14 +134,15 @@ struct Candidate {
   int period_steps = 1;
 };
 
-/// Tiers and steps worth a try, a planner cycle each step; steps as short as written, cycles seldomer.
+/// Of a free motion all that `hamel trade` measures.  Else tiers and steps worth a try, a planner cycle each
+/// step; steps as short as written, cycles seldomer.
 std::vector<Candidate> candidates(const scene::Scene& s) {
   const double horizon_s = horizon_of(s);
   std::vector<Candidate> out;
   if (!s.steered) {
     const trade::Motion motion{
         .chain = s.robot.chain, .q0 = s.q0, .qd0 = s.qd0, .horizon_s = horizon_s, .base = s.dynamics};
-    for (const scene::DynamicsOptions& o : trade::candidates(motion, true)) out.push_back({o, 1});
+    for (const scene::DynamicsOptions& o : trade::candidates(motion, false)) out.push_back({o, 1});
     return out;
   }
   const auto add = [&](Tier tier, double times, int period_steps) {
@@ -195,7 +196,7 @@ Setting measure(const scene::Scene& s, const Converged& reference, const trade::
 }
 
 double error_bound(const Setting& s, const Converged& reference) noexcept {
-  return kBetween * (s.joint_error + reference.uncertainty) + kRounding;
+  return trade::error_bound(s.joint_error, reference.uncertainty);
 }
 
 bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& reference) noexcept {
@@ -206,9 +207,12 @@ bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& refe
 Choosing choose(const scene::Scene& s, const trade::Watch& watch) {
   Choosing out;
   out.reference = converge(s, watch);
-  if (!(out.reference.uncertainty <= 0.2 * s.accuracy.joint_error_rad)) return out;
-  for (const Candidate& c : candidates(s)) {
+  if (!trade::judges(out.reference.uncertainty, s.accuracy.joint_error_rad)) return out;
+  const std::vector<Candidate> all = candidates(s);
+  for (const Candidate& c : all) {
     if (watch.stop()) return out;
+    watch.say("tier and step: " + std::to_string(out.tried.size()) + " of " + std::to_string(all.size()) +
+              " tried, " + trade::label(c.dynamics) + " dt " + text(c.dynamics.dt_s) + " s");
     out.tried.push_back(measure(with(s, c.dynamics, c.period_steps), out.reference, watch));
     const Setting& now = out.tried.back();
     if (meets(s.accuracy, now, out.reference) && (!out.chosen || now.work_per_s < out.chosen->work_per_s))

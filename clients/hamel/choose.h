@@ -46,8 +46,8 @@ Setting measure(const scene::Scene& scene, const Converged& reference, const tra
 /// cycles, each with the time it usually takes, so that it is the same on every machine and in every process;
 /// wall times stand beside it.
 Choosing choose(const scene::Scene& scene, const trade::Watch& watch);
-/// What no joint is off by at any time of the horizon: twice what was measured at the instants, for what lies
-/// between them, and the reference's own uncertainty [rad or m].
+/// What no joint is off by at any time of the horizon, by the rule that `hamel trade` recommends by
+/// (trade_choice.h) [rad or m].
 double error_bound(const Setting& s, const Converged& reference) noexcept;
 /// True when a setting's bound keeps to what was asked.
 bool meets(const scene::Accuracy& asked, const Setting& s, const Converged& reference) noexcept;

@@ -1,6 +1,7 @@
 #include "clients/hamel/chosen.h"
 
 #include "clients/hamel/choose.h"
+#include "clients/hamel/progress.h"
 #include "common/runtime/log.h"
 #include "common/scene/reduce.h"
 
@@ -9,7 +10,12 @@ namespace hamel::client {
 Checked<scene::Scene> load_chosen(runtime::RunOptions& o) {
   auto scene = runtime::load(o);
   if (!scene || !scene::wanted(scene.value().reduce, scene.value().reduce.step, false)) return scene;
-  const Choosing c = choose(scene.value(), steady_watch());
+  const Choosing c = [&] {
+    Doing doing;
+    trade::Watch watch = steady_watch();
+    watch.tell = [&](const std::string& what) { doing.say(what); };
+    return choose(scene.value(), watch);
+  }();
   if (!c.chosen) {
     apply(c, scene.value());
     spdlog::warn("{}: nothing tried keeps every joint within {:g} over {:g} s; tier and step stay as written",

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "clients/hamel/explain_cost.h"
 #include "clients/hamel/explain_table.h"
+#include "clients/hamel/progress.h"
 #include "common/files/scene_text.h"
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
@@ -53,17 +55,18 @@ void print_reductions(const Explained& e) {
 
 void print_costs(const Explained& e) {
   const auto row = [&](const std::string& name, const StepCost& c) {
-    fmt::print("  {:<20} {:>12.3f} {:>12} {:>12.3f} {:>8.2f} {:>14.1e}\n", name, c.dynamics_us,
-               e.written.steered ? fmt::format("{:.3f}", c.planner_us) : "-", c.total_us(),
-               c.total_us() / e.full_cost.total_us(), c.joint_error);
+    fmt::print("  {:<20} {:>12.3f} {:>12} {:>12.3f} {:>10.4g} {:>8.2f} {:>14}\n", name, c.dynamics_us,
+               e.written.steered ? fmt::format("{:.3f}", c.planner_us) : "-", c.total_us(), c.dt_s,
+               c.of(e.full_cost), std::isfinite(c.joint_error) ? fmt::format("{:.1e}", c.joint_error) : "-");
   };
-  fmt::print("\n  {:<20} {:>12} {:>12} {:>12} {:>8} {:>14}\n", "cost of a step [us]", "dynamics", "planner",
-             "both", "of full", "joints [rad]");
+  fmt::print("\n  {:<20} {:>12} {:>12} {:>12} {:>10} {:>8} {:>14}\n", "cost of a step [us]", "dynamics",
+             "planner", "both", "dt [s]", "of full", "joints [rad]");
   row("full fidelity", e.full_cost);
   for (const ReductionCost& r : e.each) row("without " + r.name, r.without);
   row("as reduced", e.reduced_cost);
   fmt::print(
-      "Ticks alone, no bus; the fastest of five rounds.  Joints: largest distance from those of full "
+      "Ticks alone, no bus; the fastest of five rounds.  Of full: over the same time of the run.  Joints: "
+      "largest distance from those of full "
       "fidelity.\n");
 }
 
@@ -86,13 +89,15 @@ void print_choice(const Explained& e) {
   fmt::print("\n");
 }
 
-Json json_of(const StepCost& c, bool steered) {
+Json json_of(const StepCost& c, const Explained& e) {
   return {{"dynamics_us", c.dynamics_us},
-          {"planner_us", steered ? Json(c.planner_us) : Json(nullptr)},
+          {"planner_us", e.written.steered ? Json(c.planner_us) : Json(nullptr)},
+          {"dt_s", c.dt_s},
+          {"of_full", c.of(e.full_cost)},
           {"joint_error", c.joint_error}};
 }
 
-Json before_after(double before, double after) { return {{"before", before}, {"after", after}}; }
+Json before_after(int before, int after) { return {{"before", before}, {"after", after}}; }
 
 Json json_of(const Explained& e) {
   const scene::Scene& s = e.reduced;
@@ -102,11 +107,10 @@ Json json_of(const Explained& e) {
   j["space"] = space_of(s);
   const scene::Reduction* fixed = find(s, "fixed");
   const int n = s.robot.chain.n();
-  const double joints = fixed ? fixed->before : n;
-  j["links"] = before_after(joints, n);
+  const int joints = fixed ? static_cast<int>(fixed->before) : n;
+  j["links"] = before_after(joints + 1, n + 1);  // of a tree, the base among them
   j["joints"] = before_after(joints, n);
-  const scene::Reduction* obstacles = find(s, "obstacles");
-  j["obstacles"] = obstacles ? before_after(obstacles->before, obstacles->after) : before_after(0, 0);
+  j["obstacles"] = {{"before", e.obstacles.before}, {"after", e.obstacles.after}};
   j["tier"] = scene::to_string(s.dynamics.tier);
   j["dt_s"] = s.dynamics.dt_s;
   j["bounds"] = Json::array();
@@ -122,10 +126,8 @@ Json json_of(const Explained& e) {
           {{"name", r.name}, {"bound", r.bound}, {"unit", r.bound_unit}, {"measured", measured(e, r.name)}});
   }
   j["asked_for_but"] = scene::refused(s);
-  j["cost_per_step"] = {{"full", json_of(e.full_cost, s.steered)},
-                        {"reduced", json_of(e.reduced_cost, s.steered)}};
-  for (const ReductionCost& r : e.each)
-    j["cost_per_step"]["without " + r.name] = json_of(r.without, s.steered);
+  j["cost_per_step"] = {{"full", json_of(e.full_cost, e)}, {"reduced", json_of(e.reduced_cost, e)}};
+  for (const ReductionCost& r : e.each) j["cost_per_step"]["without " + r.name] = json_of(r.without, e);
   j["measured_error"] =
       e.choosing && e.choosing->chosen ? e.choosing->chosen->joint_error : e.reduced_cost.joint_error;
   return j;
@@ -137,6 +139,8 @@ void print_text(const Explained& e) {
       "{}: {} in {}, {} joints, {} dt {:.6g} s{}\n", s.name, s.robot.name, space_of(s), s.robot.chain.n(),
       trade::label(s.dynamics), s.dynamics.dt_s,
       s.steered ? fmt::format(", a planner cycle every {} steps", s.planner.period_steps) : ", free motion");
+  if (s.steered)
+    fmt::print("obstacles: {} at most, the planner is handed {}\n", e.obstacles.before, e.obstacles.after);
   print_reductions(e);
   print_costs(e);
   print_choice(e);
@@ -152,10 +156,14 @@ int explain(const ExplainArgs& args) {
     if (!s) return runtime::complain("hamel explain", s.error());
     scenes.push_back(std::move(s).value());
   }
-  if (args.table) return print_table(scenes, steady_watch());
+  Doing doing;
+  trade::Watch watch = steady_watch();
+  watch.tell = [&](const std::string& what) { doing.say(what); };
+  if (args.table) return print_table(scenes, watch);
   if (scenes.size() != 1)
     return runtime::complain("hamel explain", {{"SCENE", "one at a time, or several with --table"}});
-  const Explained e = explain_scene(scenes.front(), args.seconds, steady_watch());
+  const Explained e = explain_scene(scenes.front(), args.seconds, watch);
+  doing.say("");
   if (args.json)
     fmt::print("{}\n", json_of(e).dump(2));
   else

@@ -13,13 +13,24 @@ namespace hamel::client {
 /// CPU time of a step, ticks alone, and how far the joints went from those of full fidelity.
 struct StepCost {
   double dynamics_us = 0, planner_us = 0;
-  double joint_error = 0;  ///< largest |q - q of full fidelity| in the time that was run [rad or m]
+  double dt_s = 0;
+  /// Largest |q - q of full fidelity| at the times that both have, in the time that was run [rad or m]; NaN
+  /// where nothing was compared: another number of joints, or no such time.
+  double joint_error = 0;
   double total_us() const { return dynamics_us + planner_us; }
+  /// Over the same time of the run.
+  double of(const StepCost& other) const { return total_us() / dt_s / (other.total_us() / other.dt_s); }
+};
+
+/// Obstacles in the fullest set of the run, standing, moving and streamed, and how many the planner is handed
+/// of a set at most, the arm being at its start.
+struct ObstacleCount {
+  std::size_t before = 0, after = 0;
 };
 
 struct ReductionCost {
   std::string name;
-  StepCost without;  ///< the scene with this reduction forbidden
+  StepCost without;  ///< the scene with this reduction forbidden, the others and the chosen step in force
 };
 
 /// A bounded reduction by itself, over the first steps of the run: by how much the distance of a link to its
@@ -32,8 +43,10 @@ struct MeasuredError {
 };
 
 struct Explained {
-  scene::Scene written, full, reduced;
+  scene::Scene written, full;
+  scene::Scene reduced;  ///< with the chosen tier and step, if any
   StepCost full_cost, reduced_cost;
+  ObstacleCount obstacles;
   std::vector<ReductionCost> each;
   std::vector<MeasuredError> errors;  ///< of the bounded ones in force, step apart
   std::optional<Choosing> choosing;   ///< where the scene leaves tier and step to us

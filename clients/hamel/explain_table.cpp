@@ -66,7 +66,10 @@ std::vector<Row> rows_of(const scene::Scene& written, const Choosing& c, const s
 /// The chosen setting keeps to the accuracy and nothing measured that does is faster.
 bool print_rows(const scene::Scene& written, const trade::Watch& watch) {
   const scene::Scene fastest = as(written, scene::Fidelity::fastest);
-  const Choosing c = choose(fastest, watch);
+  trade::Watch named = watch;
+  named.tell = [&](const std::string& what) { watch.say(written.name + ": " + what); };
+  const Choosing c = choose(fastest, named);
+  watch.say("");
   if (!c.chosen) {
     fmt::print("| {} | none keeps to {:g}; reference known to {:.1e} | | | | | | | | | |\n", written.name,
                written.accuracy.joint_error_rad, c.reference.uncertainty);
@@ -75,6 +78,7 @@ bool print_rows(const scene::Scene& written, const trade::Watch& watch) {
   std::vector<Row> rows = rows_of(written, c, fastest);
   for (int round = 0; round < kRounds; ++round)
     for (Row& r : rows) {
+      named.say("round " + std::to_string(round + 1) + " of timing");
       const Setting now = measure(r.scene, c.reference, watch);
       const double least_s =
           round == 0 ? now.seconds_per_s : std::min(r.measured.seconds_per_s, now.seconds_per_s);
@@ -82,6 +86,7 @@ bool print_rows(const scene::Scene& written, const trade::Watch& watch) {
       r.measured.seconds_per_s = least_s;
       r.meets = meets(written.accuracy, now, c.reference);
     }
+  watch.say("");
   double other_s = scene::kInf;
   for (std::size_t k = 0; k < rows.size(); ++k)
     if (k != 2 && rows[k].meets) other_s = std::min(other_s, rows[k].measured.seconds_per_s);

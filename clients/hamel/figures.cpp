@@ -20,6 +20,8 @@ namespace {
 using dynamics::Options;
 using scene::Tier;
 
+constexpr double kStill_m = 1e-9;  // a way so short is no motion
+
 /// One tier's motion, a row each step.
 struct Course {
   std::vector<std::vector<Eigen::Vector3d>> com_m;  ///< of each link
@@ -102,6 +104,12 @@ class Figure {
   std::string name_, csv_;
 };
 
+/// An axis of some length where nothing changes, else gnuplot's own.
+std::string y_range(double low, double high) {
+  return high - low > kStill_m ? "set yrange [*:*]\n"
+                               : fmt::format("set yrange [{}:{}]\n", low - 1, high + 1);
+}
+
 /// The two world axes along which the centres of mass move most.
 std::pair<int, int> plane(const Course& c) {
   Eigen::Vector3d low = c.com_m[0][0], high = low;
@@ -126,6 +134,10 @@ std::optional<Problem> figure3(const std::filesystem::path& folder, const scene:
       "set size ratio -1\nset key outside\nset xlabel '{} [m]'\nset ylabel '{} [m]'\n"
       "set title 'Paths of the centres of mass, {:g} s'\nplot ",
       "xyz"[across], "xyz"[up], s.duration_s);
+  double low = c.com_m[0][0][up], high = low;
+  for (const auto& row : c.com_m)
+    for (const auto& p : row) low = std::min(low, p[up]), high = std::max(high, p[up]);
+  body.insert(0, y_range(low, high));
   for (int i = 0; i < s.robot.chain.n(); ++i)
     body += fmt::format("{}csv using {}:{} skip 1 with lines title 'link {}'", i ? ", " : "",
                         3 * i + 2 + across, 3 * i + 2 + up, i + 1);
@@ -140,19 +152,27 @@ std::optional<Problem> figure4(const std::filesystem::path& folder, const scene:
   for (std::size_t k = 0; k < hamel.height_m.size(); ++k)
     f.row({static_cast<double>(k) * s.dynamics.dt_s, hamel.height_m[k], euler.height_m[k],
            midpoint.height_m[k], truth.height_m[k]});
+  const auto [low, high] = std::minmax_element(truth.height_m.begin(), truth.height_m.end());
+  double most_m = 0;
+  for (std::size_t k = 0; k < hamel.height_m.size(); ++k)
+    for (const Course* c : {&hamel, &euler, &midpoint})
+      most_m = std::max(most_m, std::abs(c->height_m[k] - truth.height_m[k]));
   return f.finish(
       1000, 640,
-      "set multiplot layout 2,1\nset key outside\nset xlabel 't [s]'\nset ylabel 'height [m]'\n"
-      "set title 'End effector'\n"
-      "plot csv using 1:5 skip 1 with lines lw 2 lc rgb '#bbbbbb' title 'reference', "
-      "csv using 1:2 skip 1 with lines lc rgb '#114488' title 'hamel, Eq. (13)', "
-      "csv using 1:3 skip 1 with lines dt 2 lc rgb '#cc6644' title 'semi-implicit Euler'\n"
-      "set title 'Distance from the reference'\nset logscale y\nset yrange [1e-8:*]\nset format y "
-      "'1e%T'\nset ylabel '[m]'\n"
-      "plot csv using 1:(abs($2-$5)+1e-12) skip 1 with lines lc rgb '#114488' title 'hamel, Eq. (13)', "
-      "csv using 1:(abs($3-$5)+1e-12) skip 1 with lines lc rgb '#cc6644' title 'semi-implicit Euler', "
-      "csv using 1:(abs($4-$5)+1e-12) skip 1 with lines lc rgb '#228833' title 'midpoint'\n"
-      "unset multiplot\n");
+      "set multiplot layout 2,1\nset key outside\nset xlabel 't [s]'\nset ylabel 'height [m]'\n" +
+          y_range(*low, *high) +
+          "set title 'End effector'\n"
+          "plot csv using 1:5 skip 1 with lines lw 2 lc rgb '#bbbbbb' title 'reference', "
+          "csv using 1:2 skip 1 with lines lc rgb '#114488' title 'hamel, Eq. (13)', "
+          "csv using 1:3 skip 1 with lines dt 2 lc rgb '#cc6644' title 'semi-implicit Euler'\n"
+          "set title 'Distance from the reference'\nset logscale y\nset yrange [" +
+          (most_m > 1e-7 ? "1e-8" : "1e-13") +
+          ":*]\nset format y "
+          "'1e%T'\nset ylabel '[m]'\n"
+          "plot csv using 1:(abs($2-$5)+1e-12) skip 1 with lines lc rgb '#114488' title 'hamel, Eq. (13)', "
+          "csv using 1:(abs($3-$5)+1e-12) skip 1 with lines lc rgb '#cc6644' title 'semi-implicit Euler', "
+          "csv using 1:(abs($4-$5)+1e-12) skip 1 with lines lc rgb '#228833' title 'midpoint'\n"
+          "unset multiplot\n");
 }
 
 std::optional<Problem> figure5(const std::filesystem::path& folder, const scene::Scene& s, const Course& c) {
@@ -173,8 +193,18 @@ std::optional<Problem> figure5(const std::filesystem::path& folder, const scene:
                   most + 1));
 }
 
+/// True where some centre of mass leaves its place.
+bool moves(const Course& c) {
+  for (const auto& row : c.com_m)
+    for (std::size_t i = 0; i < row.size(); ++i)
+      if ((row[i] - c.com_m[0][i]).norm() > kStill_m) return true;
+  return false;
+}
+
+/// Nothing is written before all is known to be there.
 std::optional<Problem> draw_all(const std::filesystem::path& folder, const scene::Scene& s,
                                 const runtime::StopSignal& stop) {
+  if (s.steered) return Problem{s.name, "is steered; the paper's figures show a free motion"};
   std::vector<Course> courses;
   for (const Options& o :
        {paper(s), other(s, Tier::semi_implicit_euler), other(s, Tier::midpoint), other(s, Tier::gauss)}) {
@@ -182,7 +212,11 @@ std::optional<Problem> draw_all(const std::filesystem::path& folder, const scene
     if (!course) return course.error();
     if (stop.requested()) return std::nullopt;
     courses.push_back(std::move(course).value());
+    if (!moves(courses[0])) return Problem{s.name, "does not move: it is at rest, and nothing pulls at it"};
   }
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return Problem{folder.string(), "cannot be made: " + error.message()};
   if (auto p = figure3(folder, s, courses[0])) return p;
   if (auto p = figure4(folder, s, courses[0], courses[1], courses[2], courses[3])) return p;
   if (auto p = figure5(folder, s, courses[0])) return p;
@@ -199,10 +233,6 @@ std::optional<Problem> draw_all(const std::filesystem::path& folder, const scene
 
 int figures(const FiguresArgs& args) {
   const auto work = [&](const scene::Scene& scene, const runtime::StopSignal& stop) {
-    std::error_code error;
-    std::filesystem::create_directories(args.folder, error);
-    if (error)
-      return runtime::complain("hamel figures", {{args.folder, "cannot be made: " + error.message()}});
     const auto p = draw_all(args.folder, scene, stop);
     return p ? runtime::complain("hamel figures", {*p}) : int{runtime::kDone};
   };

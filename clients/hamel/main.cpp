@@ -179,8 +179,10 @@ CLI::App* add_trade(CLI::App& app, client::TradeArgs& a) {
       ->check(runtime::positive())
       ->type_name("SECONDS");
   trade
-      ->add_option("--accuracy", a.accuracy,
-                   "recommend tier and dt that keep every joint within this [rad or m]")
+      ->add_option(
+          "--accuracy", a.accuracy,
+          "recommend tier and dt that keep every joint within this [rad or m]: twice the error at 20 "
+          "instants and the reference's own must be less")
       ->check(runtime::positive());
   trade->add_option("--by", a.by, "what counts as cost: time or evaluations")
       ->check(CLI::IsMember({"time", "evaluations"}))

@@ -33,8 +33,10 @@ void print_reference(const scene::Scene& s, const trade::Motion& m, const trade:
         "this scene is steered; measured is the arm left to itself from the same start: no planner, no\n"
         "obstacles, no compensation of gravity.  It may move faster or slower than when it is steered.\n");
   if (r.valid_s <= 0)
-    fmt::print("reference: none: two runs of gauss-8 disagree within {:.6g} s; joint errors mean nothing\n",
-               m.horizon_s / trade::kSamples);
+    fmt::print(
+        "reference: none (valid up to 0 s): two runs of gauss-8 disagree within {:.6g} s; joints are not "
+        "compared\n",
+        m.horizon_s / trade::kSamples);
   else
     fmt::print(
         "reference: gauss-8, dt {:.6g} s; halving the step moves no joint by more than {:.1e} up to {:.6g} "
@@ -44,45 +46,58 @@ void print_reference(const scene::Scene& s, const trade::Motion& m, const trade:
     fmt::print("           beyond that nothing converges (chaotic motion): joint errors count up to there\n");
 }
 
-void print_table(const std::vector<Measured>& all) {
-  fmt::print("\n  {:<26}{:>10} {:>10} {:>10} {:>10} {:>12} {:>10} {:>12} {:>8}\n", "method", "dt [s]",
-             "joints", "energy", "momentum", "time [us/s]", "evals/s", "iterations", "divided");
+/// Up to when joints are compared, where the reference ends before the motion.
+std::string joints_head(const trade::Motion& m, const trade::Reference& r) {
+  const bool whole = r.valid_s >= m.horizon_s * (1 - 1e-9);
+  return whole || r.valid_s <= 0 ? "joints" : fmt::format("joints to {:.4g} s", r.valid_s);
+}
+
+void print_table(const std::vector<Measured>& all, const trade::Motion& motion, const trade::Reference& r) {
+  const std::string joints = joints_head(motion, r);
+  const std::size_t wide = std::max<std::size_t>(10, joints.size());
+  fmt::print("\n  {:<26}{:>10} {:>{}} {:>10} {:>10} {:>12} {:>10} {:>12} {:>8}\n", "method", "dt [s]", joints,
+             wide, "energy", "momentum", "time [us/s]", "evals/s", "iterations", "divided");
   for (const Measured& m : all) {
     const std::string name = trade::label(m.options);
     if (!m.finished) {
       fmt::print("  {:<26}{:>10.4g} refused a step at t = {:.4g} s\n", name, m.options.dt_s, m.refused_s);
       continue;
     }
-    fmt::print("{} {:<26}{:>10.4g} {:>10} {:>10} {:>10} {:>12.1f} {:>10.0f} {:>7.1f}/{:<4} {:>8}\n",
-               m.on_front ? '*' : ' ', name, m.options.dt_s, small(m.joint_error), small(m.energy_error),
-               small(m.momentum_error), 1e6 * m.seconds_per_s, m.evaluations_per_s, m.iterations_mean,
-               m.iterations_max, m.substepped > 0 ? std::to_string(m.substepped) : "");
+    fmt::print("{} {:<26}{:>10.4g} {:>{}} {:>10} {:>10} {:>12.1f} {:>10.0f} {:>7.1f}/{:<4} {:>8}\n",
+               m.on_front ? '*' : ' ', name, m.options.dt_s, small(m.joint_error), wide,
+               small(m.energy_error), small(m.momentum_error), 1e6 * m.seconds_per_s, m.evaluations_per_s,
+               m.iterations_mean, m.iterations_max, m.substepped > 0 ? std::to_string(m.substepped) : "");
   }
   fmt::print(
-      "\n* nothing measured is both cheaper and more accurate.  Errors: largest |q - reference| [rad or m]; "
+      "\n* nothing measured is both cheaper and {}.  Errors: largest |q - reference| [rad or m]; "
       "|E - E0 - work| and momentum\n  about joint 1 relative to the largest in play.  Time: wall time of a "
-      "simulated second.\n");
+      "simulated second.\n",
+      r.valid_s > 0 ? "more accurate" : "keeps energy better");
 }
 
-std::optional<Problem> write_csv(const std::string& path, const std::vector<Measured>& all) {
+/// Empty where there is no number.
+std::string cell(double v) { return std::isnan(v) ? "" : fmt::format("{}", v); }
+
+std::optional<Problem> write_csv(const std::string& path, const std::vector<Measured>& all,
+                                 const trade::Reference& reference) {
   std::ofstream out(path);
-  out << "method,tier,root,stages,dt_s,tolerance_Nm,tolerance_rel,finished,joint_error,energy_error,momentum_"
-         "error,"
-         "time_s_per_s,evaluations_per_s,iterations_mean,iterations_max,divided_steps,front\n";
+  out << "method,tier,root,stages,dt_s,tolerance_Nm,tolerance_rel,finished,valid_s,joint_error,energy_error,"
+         "momentum_error,time_s_per_s,evaluations_per_s,iterations_mean,iterations_max,divided_steps,front\n";
   for (const Measured& m : all)
-    out << fmt::format("{},{},{},{},{},{},{},{:d},{},{},{},{},{},{},{},{},{:d}\n", trade::label(m.options),
+    out << fmt::format("{},{},{},{},{},{},{},{:d},{},{},{},{},{},{},{},{},{},{:d}\n", trade::label(m.options),
                        scene::to_string(m.options.tier), scene::to_string(m.options.root), m.options.stages,
                        m.options.dt_s, m.options.tolerance_Nm, m.options.tolerance_rel, m.finished,
-                       m.joint_error, m.energy_error, m.momentum_error, m.seconds_per_s, m.evaluations_per_s,
-                       m.iterations_mean, m.iterations_max, m.substepped, m.on_front);
+                       reference.valid_s, cell(m.joint_error), cell(m.energy_error), cell(m.momentum_error),
+                       m.seconds_per_s, m.evaluations_per_s, m.iterations_mean, m.iterations_max,
+                       m.substepped, m.on_front);
   out.flush();
   if (!out) return Problem{path, "cannot be written"};
   return std::nullopt;
 }
 
-/// Joint error and energy error against cost, a line for each method.
+/// Joint error, where joints were compared, and energy error against cost, a line for each method.
 std::optional<Problem> draw_all(const std::string& path, const std::string& title,
-                                const std::vector<Measured>& all, trade::Cost by) {
+                                const std::vector<Measured>& all, trade::Cost by, bool compared) {
   std::vector<std::pair<std::string, std::vector<const Measured*>>> groups;
   for (const Measured& m : all) {
     if (!m.finished || m.options.tolerance_Nm == 1e-6) continue;
@@ -94,28 +109,31 @@ std::optional<Problem> draw_all(const std::string& path, const std::string& titl
   }
   const double scale = by == trade::Cost::time ? 1e6 : 1;
   Script s;
-  s.add("{}", terminal(path, 1200, 560));
+  s.add("{}", terminal(path, compared ? 1200 : 700, 560));
   for (std::size_t i = 0; i < groups.size(); ++i) {
     s.add("$g{} << EOD\n", i);
     for (const Measured* m : groups[i].second)
-      s.add("{} {} {}\n", scale * trade::cost(*m, by), m->joint_error, m->energy_error + 1e-17);
+      s.add("{} {} {}\n", scale * trade::cost(*m, by), compared ? m->joint_error : 1,
+            m->energy_error + 1e-17);
     s.add("EOD\n");
   }
   s.add("$front << EOD\n");
   for (const Measured& m : all)
-    if (m.on_front) s.add("{} {}\n", scale * trade::cost(m, by), m.joint_error);
+    if (m.on_front)
+      s.add("{} {}\n", scale * trade::cost(m, by), compared ? m.joint_error : m.energy_error + 1e-17);
   s.add(
-      "EOD\nset multiplot layout 1,2 title \"{}\" noenhanced\nset logscale xy\nset format '1e%T'\nset "
+      "EOD\nset multiplot layout 1,{} title \"{}\" noenhanced\nset logscale xy\nset format '1e%T'\nset "
       "grid\nset xlabel '{}'\n",
-      title,
+      compared ? 2 : 1, title,
       by == trade::Cost::time ? "time of a simulated second [us]" : "evaluations of a simulated second");
   for (const int column : {2, 3}) {
+    if (column == 2 && !compared) continue;
     s.add("set key {}\nset ylabel '{}'\nplot ", column == 2 ? "off" : "outside right noenhanced",
           column == 2 ? "joint error [rad]" : "energy error / scale");
     for (std::size_t i = 0; i < groups.size(); ++i)
       s.add("$g{} using 1:{} with linespoints lw 1.5 lt {} title '{}'{}", i, column, i + 1, groups[i].first,
             i + 1 < groups.size() ? ", " : "");
-    if (column == 2) s.add(", $front using 1:2 with points pt 6 ps 1.6 lc rgb 'black' notitle");
+    if ((column == 2) == compared) s.add(", $front using 1:2 with points pt 6 ps 1.6 lc rgb 'black' notitle");
     s.add("\n");
   }
   s.add("unset multiplot\n");
@@ -130,7 +148,8 @@ int print_recommendation(const TradeArgs& args, const trade::Motion& m, const st
                args.accuracy, m.horizon_s);
     fmt::print(
         "{}.\n",
-        r.valid_s < m.horizon_s * (1 - 1e-9)
+        r.valid_s <= 0 ? ": there is no reference"
+        : r.valid_s < m.horizon_s * (1 - 1e-9)
             ? fmt::format(": no method has an answer after {:.4g} s, where the reference ends", r.valid_s)
             : "");
     return runtime::kFailed;
@@ -139,8 +158,10 @@ int print_recommendation(const TradeArgs& args, const trade::Motion& m, const st
   fmt::print("\nTo keep every joint within {:g} over {:g} s: {} with dt {:.6g} s\n", args.accuracy,
              m.horizon_s, trade::label(o), o.dt_s);
   fmt::print(
-      "  measured: joints {:.1e}, energy {:.1e}, {:.1f} us and {:.0f} evaluations a simulated second\n",
-      best->joint_error, best->energy_error, 1e6 * best->seconds_per_s, best->evaluations_per_s);
+      "  measured: joints {:.1e} at {} instants, within {:.1e} at all times; energy {:.1e}, {:.1f} us and "
+      "{:.0f} evaluations a simulated second\n",
+      best->joint_error, trade::kSamples, trade::error_bound(best->joint_error, r.uncertainty),
+      best->energy_error, 1e6 * best->seconds_per_s, best->evaluations_per_s);
   fmt::print("  --set dynamics.tier={} --set dynamics.dt_s={}", scene::to_string(o.tier), o.dt_s);
   if (o.tier == scene::Tier::gauss) fmt::print(" --set dynamics.stages={}", o.stages);
   if (o.tier == scene::Tier::dopri8) fmt::print(" --set dynamics.tolerance_rel={:g}", o.tolerance_rel);
@@ -174,19 +195,25 @@ int sweep(const TradeArgs& args, const scene::Scene& s, const runtime::StopSigna
                              .horizon_s = args.horizon_s > 0 ? args.horizon_s : s.duration_s,
                              .tick_s = args.tick_s > 0 ? args.tick_s : scene::kInf,
                              .base = s.dynamics};
-  const trade::Watch watch{now_s, [&] { return stop.requested(); }};
-  const trade::Reference reference = trade::converge(motion, watch);
+  trade::Watch watch{now_s, [&] { return stop.requested(); }};
+  const trade::Reference reference = [&] {
+    Doing doing;
+    watch.tell = [&](const std::string& what) { doing.say(what); };
+    return trade::converge(motion, watch);
+  }();
+  watch.tell = {};
   std::vector<Measured> all = measure_all(args, motion, reference, watch);
   if (stop.requested()) return runtime::kInterrupted;
   trade::mark_front(all, reference, by);
   print_reference(s, motion, reference);
-  print_table(all);
+  print_table(all, motion, reference);
   const int code =
       args.accuracy > 0 ? print_recommendation(args, motion, all, reference, by) : runtime::kDone;
   if (!args.csv_path.empty())
-    if (const auto p = write_csv(args.csv_path, all)) return runtime::complain("hamel trade", {*p});
+    if (const auto p = write_csv(args.csv_path, all, reference))
+      return runtime::complain("hamel trade", {*p});
   if (!args.plot_path.empty())
-    if (const auto p = draw_all(args.plot_path, s.name, all, by))
+    if (const auto p = draw_all(args.plot_path, s.name, all, by, reference.valid_s > 0))
       return runtime::complain("hamel trade", {*p});
   return code;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/text.h"
 #include "common/rbd/rbd.h"
 
 namespace hamel::trade {
@@ -42,9 +43,12 @@ std::vector<VectorXd> trajectory(const Motion& m, const Options& options, const 
   dynamics::Integrator integrator(m.chain, options);
   dynamics::State s = integrator.start(m.q0, m.qd0);
   std::vector<VectorXd> q;
-  run(
-      integrator, s, m, watch, [&](int, const dynamics::State& now) { q.push_back(now.q); },
-      [](const auto&, const auto&) {});
+  const auto at = [&](int k, const dynamics::State& now) {
+    q.push_back(now.q);
+    watch.say("reference: gauss-8, dt " + text(options.dt_s) + " s, " + std::to_string(100 * k / kSamples) +
+              " %");
+  };
+  run(integrator, s, m, watch, at, [](const auto&, const auto&) {});
   return q;
 }
 
@@ -101,7 +105,7 @@ Measured once(const Motion& m, const Options& options, const Reference& referenc
       [&](int k, const dynamics::State& now) {
         if (m.horizon_s * k / kSamples > valid) return;
         const double off = (now.q - reference.q[static_cast<std::size_t>(k - 1)]).lpNorm<Eigen::Infinity>();
-        out.joint_error = std::max(out.joint_error, off);
+        out.joint_error = std::isnan(out.joint_error) ? off : std::max(out.joint_error, off);
       },
       [&](const dynamics::StepReport& r, const dynamics::State& now) { account.add(r, now, p1, out); });
   const double simulated = static_cast<double>(account.steps) * options.dt_s;

@@ -25,10 +25,14 @@ struct Motion {
   dynamics::Options base;  ///< what the candidates start from; its dt_s is the middle of the steps tried
 };
 
-/// The clock, and whether to end early; both may be called often.
+/// The clock, whether to end early, and who is told what is being done, if any; all may be called often.
 struct Watch {
   std::function<double()> now_s;
   std::function<bool()> stop;
+  std::function<void(const std::string&)> tell = {};
+  void say(const std::string& what) const {
+    if (tell) tell(what);
+  }
 };
 
 struct Reference {
@@ -44,7 +48,8 @@ struct Measured {
   dynamics::Options options;
   bool finished = false;  ///< false: a step was refused at refused_s
   double refused_s = 0;
-  double joint_error = 0;     ///< largest |q - q_ref| at an instant where the reference holds [rad or m]
+  /// Largest |q - q_ref| at an instant where the reference holds [rad or m]; NaN: nothing was compared.
+  double joint_error = std::numeric_limits<double>::quiet_NaN();
   double energy_error = 0;    ///< largest |E - E(0) - work| over the energy scale
   double momentum_error = 0;  ///< largest |p_1 - p_1(0)| over the largest momentum; NaN: not conserved
   double seconds_per_s = 0;   ///< wall time of a simulated second

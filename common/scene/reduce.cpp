@@ -58,7 +58,7 @@ void reduce_plane(Scene& s) {
 }
 
 /// True where the weight is parallel to every axis that turns and across every one that slides, whatever q:
-/// on a planar arm the axes keep their directions.
+/// turning about the weight leaves the angle of any other axis to it as it is.
 bool weight_rests(const model::Chain& chain) {
   const Eigen::Vector3d g = chain.gravity_W_mps2();
   lie::Pose X_WB = chain.X_WB0();
@@ -70,7 +70,7 @@ bool weight_rests(const model::Chain& chain) {
     const double across = slides ? std::abs(axis_W.dot(g)) : axis_W.cross(g).norm();
     if (across > kParallel * g.norm()) return false;
   }
-  return rbd::is_planar(chain);
+  return true;
 }
 
 void reduce_gravity(Scene& s) {

@@ -20,7 +20,7 @@ namespace hamel::scene {
 ///   locked     exact: locked joints frozen into composite inertias (locked.h)
 ///   plane      exact: SE(2) where all revolute axes are parallel and all slides across them
 ///   gravity    exact: zero where it works on no joint, that is parallel to every revolute axis and across
-///              every slide of a planar arm; the potential energy loses its constant
+///              every slide; the potential energy loses its constant
 ///   terms      exact: stop torques are not evaluated where there are no stops
 ///   self       exact: pairs of links are passed over while they cannot have come near each other
 ///   obstacles  exact: those that never matter (reach.h) are dropped from each set as it arrives

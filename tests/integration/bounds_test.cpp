@@ -14,27 +14,32 @@ namespace hamel {
 namespace {
 
 /// A bound against what was found: never less, not ten times as much in the median, and half of it would be
-/// caught.
+/// caught.  In some cases the arm meets nothing of what a reduction changed and the error is 0: where most
+/// cases change something they count in the median, as a bound that is infinitely idle; else it is that of
+/// the cases which changed, whose share is recorded beside it.
 struct Tally {
   std::vector<double> ratios;
+  std::size_t changed = 0;
   std::size_t in_force = 0;
   int half_broken = 0;
   void add(double bound, double found) {
     ++in_force;
     EXPECT_LE(found, bound * (1 + 1e-6) + 1e-9);
-    if (found > 1e-9) ratios.push_back(bound / found);
+    changed += found > 1e-9;
+    ratios.push_back(found > 1e-9 ? bound / found : scene::kInf);
     half_broken += found > 0.5 * bound;
   }
-  /// `most`: cases; of half of them it must be in force, and of `least` change anything.
-  void judge(std::size_t most, std::size_t least) {
-    EXPECT_GE(2 * in_force, most);
-    ASSERT_GE(ratios.size(), least) << "of " << in_force << " in force";
+  /// `least`: cases in which anything changed; `of_all`: the median is that of all cases, else of these.
+  void judge(std::size_t least, bool of_all) {
+    ASSERT_GE(changed, least) << "of " << in_force << " in force";
+    if (!of_all) std::erase(ratios, scene::kInf);
     const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
     std::nth_element(ratios.begin(), middle, ratios.end());
     EXPECT_LT(*middle, 10);
     EXPECT_GT(half_broken, 0) << "half the bound is no bound";
     testing::Test::RecordProperty("median", std::to_string(*middle));
     testing::Test::RecordProperty("half_broken", half_broken);
+    testing::Test::RecordProperty("changed_of", std::to_string(changed) + "/" + std::to_string(in_force));
   }
 };
 
@@ -59,7 +64,7 @@ TEST(BoundedReductions, CyclesAreNeverTooSeldom) {
     if (bound > 0) tally.add(bound, client::closed_in(s, 300));
   }
   ASSERT_EQ(tally.in_force, cases);
-  tally.judge(cases, cases * 9 / 10);
+  tally.judge(cases * 9 / 10, true);
 }
 
 /// A random arm whose links are cylinders, a pole with a thicker end across its way and a
@@ -112,8 +117,8 @@ INSTANTIATE_TEST_SUITE_P(BoundedReductions, DistanceBounds,
 TEST_P(DistanceBounds, HoldInEveryRun) {
   test::Random rng(77);
   Tally tally;
-  const std::size_t scenes = test::soak() ? 1000 : 120;
-  for (std::size_t k = 0; k < scenes; ++k) {
+  const std::size_t cases = test::soak() ? 1000 : 120;  // in force
+  for (std::size_t k = 0; k < 4 * cases && tally.in_force < cases; ++k) {
     SCOPED_TRACE(k);
     scene::Scene reduced = scene_to_bound(rng, k % 2 == 0);
     const std::string name = GetParam().name;
@@ -131,7 +136,8 @@ TEST_P(DistanceBounds, HoldInEveryRun) {
     const double near_m = name == "merge" ? reduced.planner.rho0_m : scene::kInf;
     tally.add(r->bound, client::distance_error(reduced, exact, 100, near_m));
   }
-  tally.judge(scenes, scenes / 6);
+  ASSERT_EQ(tally.in_force, cases);
+  tally.judge(cases / 6, false);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "clients/hamel/choose.h"
 #include "common/files/scene_text.h"
+#include "common/rbd/rbd.h"
 #include "common/scene/reduce.h"
 #include "tests/support/reduce_scene.h"
 #include "tests/support/soak.h"
@@ -76,6 +77,62 @@ TEST(Choosing, KeepsToItsBoundAtEveryStepAndTheBoundIsNotIdle) {
   std::nth_element(ratios.begin(), ratios.begin() + chosen / 2, ratios.end());
   EXPECT_LT(ratios[static_cast<std::size_t>(chosen / 2)], 10);
   EXPECT_GT(half_broken, 0) << "a bound of less than half would have been caught";
+}
+
+/// What `trade` measures of a free motion is tried too, so that nothing it shows is cheaper.
+TEST(Choosing, TriesAllThatTradeMeasures) {
+  test::Random rng(7);
+  const scene::Scene s = swing(rng);
+  const Choosing c = choose(s, steady_watch());
+  ASSERT_TRUE(c.chosen);
+  const trade::Motion motion{
+      .chain = s.robot.chain, .q0 = s.q0, .qd0 = s.qd0, .horizon_s = s.duration_s, .base = s.dynamics};
+  for (const dynamics::Options& o : trade::candidates(motion, false))
+    EXPECT_TRUE(std::any_of(c.tried.begin(), c.tried.end(),
+                            [&](const Setting& t) {
+                              return trade::label(t.dynamics) == trade::label(o) && t.dynamics.dt_s == o.dt_s;
+                            }))
+        << trade::label(o) << " " << o.dt_s;
+}
+
+/// The energy asked for is kept to at every step, by a measure of its own: kinetic and potential energy less
+/// the work of damping, over the energy scale.
+TEST(Choosing, KeepsToTheEnergyAskedFor) {
+  test::Random rng(31);
+  int stricter = 0;
+  for (int k = 0; k < 12; ++k) {
+    SCOPED_TRACE(k);
+    scene::Scene s = swing(rng);
+    s.accuracy.joint_error_rad = 1e-2;
+    const Choosing loose = choose(s, steady_watch());
+    s.accuracy.energy_error_rel = std::pow(10, rng.uniform(-9, -5));
+    const Choosing c = choose(s, steady_watch());
+    if (!c.chosen) continue;
+    EXPECT_LE(c.chosen->energy_error, s.accuracy.energy_error_rel);
+    for (const Setting& t : c.tried)
+      if (t.energy_error > s.accuracy.energy_error_rel) {
+        EXPECT_FALSE(meets(s.accuracy, t, c.reference));
+      }
+    stricter += loose.chosen && loose.chosen->energy_error > s.accuracy.energy_error_rel;
+    bool damped = s.dynamics.stop_stiffness > 0;
+    for (int i = 0; i < s.robot.chain.n(); ++i) damped |= s.robot.chain.joint(i).damping > 0;
+    const double scale = rbd::energy_scale(s.robot.chain);
+    if (damped || !(scale > 0)) continue;  // then energy itself stays
+    dynamics::Integrator arm(s.robot.chain, c.chosen->dynamics);
+    dynamics::State x = arm.start(s.q0, s.qd0);
+    rbd::Workspace ws(s.robot.chain);
+    const auto energy = [&] {
+      rbd::positions(s.robot.chain, x.q, ws);
+      return 0.5 * x.p.dot(x.qd) + rbd::potential_energy(s.robot.chain, ws);
+    };
+    const double at_start = energy();
+    const VectorXd none = VectorXd::Zero(s.q0.size());
+    for (long long step = std::llround(s.duration_s / c.chosen->dynamics.dt_s); step > 0; --step) {
+      ASSERT_TRUE(arm.step(x, none).usable());
+      EXPECT_LE(std::abs(energy() - at_start), 1.01 * s.accuracy.energy_error_rel * scale + 1e-12 * scale);
+    }
+  }
+  EXPECT_GT(stricter, 3) << "the energy never decided";
 }
 
 TEST(Choosing, IsTheSameEachTimeAndCheapest) {

@@ -60,7 +60,7 @@ TEST_P(Choice, RecommendationMeetsWhatWasAskedAndNothingCheaperDoes) {
   const std::vector<Measured> all = some();
   for (const double accuracy : {1e-13, 1e-9, 1e-4, 1.0}) {
     const auto fits = [&](const Measured& m) {
-      return m.finished && m.substepped == 0 && m.joint_error <= accuracy;
+      return m.finished && m.substepped == 0 && error_bound(m.joint_error, 1e-14) <= accuracy;
     };
     const auto best = recommend(all, sure(1), 1, accuracy, Cost::time);
     EXPECT_EQ(best.has_value(), std::any_of(all.begin(), all.end(), fits));
@@ -68,6 +68,15 @@ TEST_P(Choice, RecommendationMeetsWhatWasAskedAndNothingCheaperDoes) {
     EXPECT_TRUE(fits(*best));
     for (const Measured& m : all) EXPECT_FALSE(fits(m) && m.seconds_per_s < best->seconds_per_s);
   }
+}
+
+/// What lies between the instants, and what the reference is off by, count: the rule of choose.h.
+TEST(Recommendation, LeavesRoomForWhatWasNotMeasured) {
+  Reference r = sure(5);
+  EXPECT_TRUE(recommend({made_up(0.49e-3, 1)}, r, 5, 1e-3, Cost::time));
+  EXPECT_FALSE(recommend({made_up(0.51e-3, 1)}, r, 5, 1e-3, Cost::time));
+  r.uncertainty = 0.02e-3;
+  EXPECT_FALSE(recommend({made_up(0.49e-3, 1)}, r, 5, 1e-3, Cost::time));
 }
 
 TEST(Recommendation, SaysNothingWhereTheReferenceDoesNotReach) {
@@ -135,6 +144,24 @@ TEST_F(Sweep, NoStepIsLongerThanTheTick) {
            .tick_s = 0.05,
            .base = motion.base};
   for (const auto& o : candidates(m, false)) EXPECT_LE(o.dt_s, 0.05 * (1 + 1e-9)) << label(o);
+}
+
+TEST_F(Sweep, NothingComparedIsNoNumberAndTheFrontIsOfEnergy) {
+  const Reference none;
+  std::vector<Measured> all;
+  for (const double dt_s : {0.02, 0.01, 0.005}) {
+    dynamics::Options o = motion.base;
+    o.dt_s = fitting_step(dt_s, motion.horizon_s);
+    all.push_back(measure(motion, o, none, watch));
+    EXPECT_TRUE(all.back().finished);
+    EXPECT_TRUE(std::isnan(all.back().joint_error)) << all.back().joint_error;
+  }
+  all.push_back(all[0]);
+  all.back().evaluations_per_s *= 2;  // dearer, and no better
+  mark_front(all, none, Cost::evaluations);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_TRUE(all[k].on_front) << k;
+  EXPECT_FALSE(all[3].on_front);
+  EXPECT_FALSE(recommend(all, none, motion.horizon_s, 1, Cost::time));
 }
 
 TEST_F(Sweep, MomentumIsJudgedOnlyWhereItStays) {

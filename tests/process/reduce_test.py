@@ -10,7 +10,7 @@ import tempfile
 import time
 import unittest
 
-from programs import BIN, hamel, main, outcome, scene
+from programs import BIN, ROOT, hamel, main, outcome, scene
 
 GRID = """
 scene: "{scene}"
@@ -27,13 +27,21 @@ class Explain(unittest.TestCase):
         j = json.loads(out)
         self.assertEqual((j["space"], j["tier"], j["dt_s"], j["fidelity"]), ("SE2", "midpoint", 0.001, "exact"))
         self.assertEqual(j["joints"]["after"], 4)
-        self.assertEqual(j["links"]["after"], 4)
+        self.assertEqual(j["links"], {"before": 6, "after": 5})
         self.assertEqual(j["obstacles"], {"before": 1, "after": 1})
         self.assertEqual(j["bounds"], [])
         self.assertIn("without plane", j["cost_per_step"])
         self.assertGreater(j["cost_per_step"]["full"]["planner_us"], 0)
         self.assertLess(j["measured_error"], 1e-9)
         self.assertTrue(all(r["why"] and r["what"] for r in j["reductions"]))
+
+    def test_links_of_the_file_and_streamed_obstacles_are_counted(self):
+        _, out, _ = hamel("explain", scene("panda_person"), "--json", "--seconds", "0.02", "--set", 'locked[0]={joint: "panda_joint3"}')
+        j = json.loads(out)
+        urdf = (ROOT / "deploy/robots/panda.urdf").read_text()
+        self.assertEqual(j["links"], {"before": urdf.count("<link name"), "after": 7})
+        self.assertEqual(j["joints"], {"before": urdf.count("<joint name"), "after": 6})
+        self.assertEqual(j["obstacles"], {"before": 6, "after": 6})
 
     def test_full_fidelity_leaves_nothing_out(self):
         _, out, _ = hamel("explain", scene("four_link_avoid"), "--json", "--seconds", "0.02", "--set", "fidelity=full")
@@ -94,6 +102,19 @@ class Fastest(unittest.TestCase):
         self.assertRegex(out, r"asked for, but +locked: no joint is locked\n")
         _, out, _ = hamel("explain", scene("panda_reach"), "--seconds", "0.02", *asked)
         self.assertIn("Asked for, but plane: revolute axes are not all parallel", out)
+
+    def test_costs_are_those_of_what_was_chosen(self):
+        code, out, _ = hamel("explain", scene("panda_reach"), "--json", "--seconds", "0.1", "--set", "fidelity=fastest")
+        self.assertEqual(code, 0)
+        j = json.loads(out)
+        cost = j["cost_per_step"]
+        self.assertEqual(cost["full"]["dt_s"], 0.001)
+        self.assertEqual(cost["reduced"]["dt_s"], j["dt_s"])
+        self.assertEqual(cost["without self"]["dt_s"], j["dt_s"])
+        self.assertEqual(cost["without step"]["dt_s"], 0.001)
+        self.assertGreater(j["dt_s"], 0.001)
+        both = [cost[k]["dynamics_us"] + cost[k]["planner_us"] for k in ("reduced", "full")]
+        self.assertAlmostEqual(cost["reduced"]["of_full"], both[0] / both[1] * 0.001 / j["dt_s"], 6)
 
     def test_run_chooses_tier_and_step_and_keeps_to_the_accuracy(self):
         code, out, _ = hamel("explain", scene("three_link_swing"), "--json", "--seconds", "0.02", "--set", "fidelity=fastest",

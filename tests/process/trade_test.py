@@ -41,6 +41,23 @@ class Trade(unittest.TestCase):
         self.assertEqual(code, 1)
         self.assertIn("Nothing measured", out)
 
+    def test_without_a_reference_no_joint_error_is_told(self):
+        with tempfile.TemporaryDirectory() as folder:
+            table, picture = pathlib.Path(folder, "t.csv"), pathlib.Path(folder, "t.svg")
+            code, out, err = hamel("trade", scene("fast_rods"), "--quick", "--horizon", "400", "--set", "dynamics.dt_s=0.05",
+                                   "--csv", table, "--plot", picture)
+            self.assertEqual(code, 0, err)
+            self.assertIn("reference: none (valid up to 0 s)", out)
+            self.assertIn("keeps energy better", out)
+            with open(table, newline="") as rows:
+                measured = list(csv.DictReader(rows))
+            self.assertEqual({(r["valid_s"], r["joint_error"]) for r in measured}, {("0", "")})
+            self.assertTrue(any(r["front"] == "1" for r in measured))
+            self.assertNotIn("joint error", picture.read_text())
+        code, out, _ = hamel("trade", scene("fast_rods"), "--quick", "--horizon", "400", "--set", "dynamics.dt_s=0.05", "--accuracy", "1")
+        self.assertEqual(code, 1)
+        self.assertIn("there is no reference", out)
+
     def test_the_same_twice_but_for_times(self):
         def rows():
             with tempfile.NamedTemporaryFile(suffix=".csv") as f:
@@ -100,6 +117,22 @@ class Figures(unittest.TestCase):
             self.assertEqual(len(steps), 10000)
             self.assertLessEqual(max(int(r["iterations"]) for r in steps), 4)  # as the paper says
             self.assertLess(max(float(r["residual_Nm"]) for r in steps), 1e-8)
+
+
+    def test_what_shows_no_free_motion_is_refused_before_anything_is_written(self):
+        for path, more, word in ((scene("four_link_avoid"), (), "is steered"), (SWING, ("--set", "gravity_mps2=[0, 0, 0]"), "does not move")):
+            with tempfile.TemporaryDirectory() as folder:
+                out_folder = pathlib.Path(folder, "figures")
+                code, out, err = hamel("figures", path, *more, "-o", out_folder)
+                self.assertEqual((code, out), (2, ""), path)
+                self.assertIn(word, err)
+                self.assertNotIn("Warning", err)
+                self.assertFalse(out_folder.exists())
+
+    def test_a_motion_that_stays_at_one_height_is_drawn_without_complaint(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, _, err = hamel("figures", SWING, "--set", "gravity_mps2=[0, 0, 0]", "--set", "qd0=[0.1, 0, 0]", "--set", "duration_s=2", "-o", folder)
+            self.assertEqual((code, err), (0, ""))
 
 
 if __name__ == "__main__":

@@ -127,6 +127,27 @@ TEST_P(Reduced, GravityIsDroppedOnlyWhereItAsksForNoTorque) {
   EXPECT_EQ(find(s, "gravity").in_force, asked < 1e-10);
 }
 
+/// Slides alone, in any directions across the weight; then one of them slightly along it.
+TEST_P(Reduced, GravityOfAGantryIsDroppedWhereNoSlideGoesUp) {
+  Scene s = test::random_scene(rng, false, 0);
+  model::ChainSpec spec = s.robot.chain.spec();
+  lie::Pose X_WB = spec.X_WB0;
+  for (model::Joint& joint : spec.joints) {
+    joint.kind = model::JointKind::prismatic;
+    X_WB = X_WB * joint.X_PJ;
+    joint.axis = X_WB.R.transpose() * spec.gravity_W_mps2.cross(rng.unit()).normalized();
+  }
+  Scene tilted = s;
+  s.robot.chain = test::checked(spec);
+  model::Joint& last = spec.joints.back();
+  last.axis = (last.axis + 1e-6 * (X_WB.R.transpose() * spec.gravity_W_mps2.normalized())).normalized();
+  tilted.robot.chain = test::checked(spec);
+  reduce(s), reduce(tilted);
+  EXPECT_TRUE(find(s, "gravity").in_force) << find(s, "gravity").why;
+  EXPECT_TRUE(s.robot.chain.gravity_W_mps2().isZero(0));
+  EXPECT_FALSE(find(tilted, "gravity").in_force);
+}
+
 TEST_P(Reduced, ReachBallsHoldEveryConfiguration) {
   const Scene s = test::random_scene(rng, GetParam() % 3 == 0, 0);
   const Reach reach(s.robot, s.planner);
