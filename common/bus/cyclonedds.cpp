@@ -130,7 +130,6 @@ Qos qos_for(const Topic& topic, bool writes, int depth, bool promises) {
   dds_qset_reliability(q.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_durability(q.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, depth);
-  dds_qset_resource_limits(q.get(), kMaxInstances * depth, kMaxInstances, depth);
   if (promises && topic.rate_hz > 0) dds_qset_deadline(q.get(), DDS_MSECS((topic.stale + more).count()));
   if (promises) dds_qset_liveliness(q.get(), DDS_LIVELINESS_AUTOMATIC, DDS_MSECS((kAlive + more).count()));
   if (writes) dds_qset_writer_data_lifecycle(q.get(), false);
@@ -172,8 +171,13 @@ class CycloneWriter final : public Writer {
 
 class CycloneReader final : public Reader {
  public:
-  CycloneReader(const Topic& topic, dds_entity_t reader, Events& events)
-      : topic_(topic), reader_(reader), events_(events) {}
+  CycloneReader(const Topic& topic, dds_entity_t reader, Events& events,
+                std::shared_ptr<const cyclone::Keys> keys)
+      : topic_(topic),
+        reader_(reader),
+        events_(events),
+        keys_(std::move(keys)),
+        dropped_before_(keys_->dropped()) {}
   ~CycloneReader() override {
     dds_set_listener(reader_, nullptr);
     dds_delete(reader_);
@@ -207,7 +211,11 @@ class CycloneReader final : public Reader {
     return id;
   }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return events_.counters(samples_, refused_, disposed_); }
+  Counters counters() const override {
+    Counters c = events_.counters(samples_, refused_, disposed_);
+    c.lost += keys_->dropped() - dropped_before_;
+    return c;
+  }
 
  private:
   bool copy(const cyclone::Sample& sample, Payload& payload) {
@@ -221,6 +229,8 @@ class CycloneReader final : public Reader {
   const Topic& topic_;
   const dds_entity_t reader_;
   Events& events_;
+  const std::shared_ptr<const cyclone::Keys> keys_;
+  const std::uint64_t dropped_before_;
   dds_instance_handle_t from_ = 0;
   mutable std::map<dds_instance_handle_t, WriterId> ids_;
   std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0;
@@ -293,7 +303,7 @@ class CycloneNode final : public Node {
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
     Events& events = make_events(topic, true);
-    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic),
+    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic).entity,
                                                 qos_for(topic, true, depth_of(topic.delivery), true).get(),
                                                 listener_for(events).get());
     return std::make_unique<CycloneWriter>(topic, checked(made, "writer", topic), events);
@@ -302,10 +312,11 @@ class CycloneNode final : public Node {
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     Events& events = make_events(topic, false);
     if (depth <= 0) depth = depth_of(topic.delivery);
-    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic),
+    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic).entity,
                                                 qos_for(topic, false, depth, ask == Ask::promises).get(),
                                                 listener_for(events).get());
-    return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events);
+    return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events,
+                                           topic_for(topic).keys);
   }
 
   std::vector<Endpoint> endpoints() override {
@@ -345,9 +356,10 @@ class CycloneNode final : public Node {
     return *events_.back();
   }
 
-  dds_entity_t topic_for(const Topic& topic) {
-    dds_entity_t& made = topics_[topic.name];
-    if (made <= 0) made = checked(cyclone::create_topic(participant_, topic), "topic", topic);
+  const cyclone::CycloneTopic& topic_for(const Topic& topic) {
+    cyclone::CycloneTopic& made = topics_[topic.name];
+    if (made.entity <= 0) made = cyclone::create_topic(participant_, topic);
+    checked(made.entity, "topic", topic);
     return made;
   }
 
@@ -355,7 +367,7 @@ class CycloneNode final : public Node {
   const std::shared_ptr<Domain> domain_;
   Inbound inbound_;
   std::vector<std::unique_ptr<Events>> events_;  // until the participant is gone
-  std::map<std::string_view, dds_entity_t> topics_;
+  std::map<std::string_view, cyclone::CycloneTopic> topics_;
   dds_entity_t participant_ = 0;
 };
 

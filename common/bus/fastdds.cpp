@@ -48,9 +48,9 @@ Qos common_qos(const Topic& topic, int depth) {
   qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = depth;
-  qos.resource_limits().max_instances = kMaxInstances;
+  qos.resource_limits().max_instances = 0;  // as many as we name ourselves
   qos.resource_limits().max_samples_per_instance = qos.history().depth;
-  qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
+  qos.resource_limits().max_samples = 0;
   qos.resource_limits().allocated_samples = latched ? 4 : 32;
   qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   qos.data_sharing().off();
@@ -64,6 +64,16 @@ void promise(Qos& qos, const Topic& topic, std::chrono::milliseconds more = {}) 
   qos.liveliness().kind = dds::AUTOMATIC_LIVELINESS_QOS;
   qos.liveliness().lease_duration = duration(kAlive + more);
   qos.liveliness().announcement_period = duration(kAlive / 3);
+}
+
+/// A stranger's samples of a key too many are refused, again and again, until an instance goes with its last
+/// writer: that holds up the stranger only.
+dds::DataReaderQos reader_qos(const Topic& topic, int depth, Ask ask) {
+  auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
+  qos.resource_limits().max_instances = kMaxInstances;
+  qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
+  if (ask == Ask::promises) promise(qos, topic, kRounding);
+  return qos;
 }
 
 dds::DataWriterQos writer_qos(const Topic& topic) {
@@ -214,9 +224,9 @@ class FastNode final : public Node {
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false));
-    auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
-    if (ask == Ask::promises) promise(qos, topic, kRounding);
-    auto& made = checked(subscriber_->create_datareader(&topic_for(topic), qos, &events), "reader", topic);
+    auto& made =
+        checked(subscriber_->create_datareader(&topic_for(topic), reader_qos(topic, depth, ask), &events),
+                "reader", topic);
     return std::make_unique<FastReader>(topic, *subscriber_, made, events);
   }
 

@@ -48,6 +48,10 @@ struct ReaderEvents final : Events, dds::DataReaderListener {
   void on_sample_lost(dds::DataReader*, const dds::SampleLostStatus& status) override {
     add(lost, status.total_count_change);
   }
+  /// A key too many, or more samples than are kept.
+  void on_sample_rejected(dds::DataReader*, const dds::SampleRejectedStatus& status) override {
+    add(lost, static_cast<std::int32_t>(status.total_count_change));
+  }
   void on_requested_deadline_missed(dds::DataReader*,
                                     const dds::RequestedDeadlineMissedStatus& status) override {
     add(late, status.total_count_change);
