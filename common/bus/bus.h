@@ -86,8 +86,9 @@ class Writer {
 class Reader {
  public:
   virtual ~Reader() = default;
-  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits. Samples
-  /// of one writer and key come in the order they were written; between keys DDS promises no order.
+  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits, or none
+  /// was found among many that had to be refused (the node's wait() then returns at once).  Samples of one
+  /// writer and key come in the order they were written; between keys DDS promises no order.
   virtual bool take(Payload& payload) = 0;
   /// The writer of the sample that take() gave last.
   virtual WriterId from() const = 0;

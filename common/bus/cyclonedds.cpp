@@ -187,7 +187,8 @@ class CycloneReader final : public Reader {
     if (!events_.waits.exchange(false)) return false;
     ddsi_serdata* data = nullptr;
     dds_sample_info_t info;
-    while (dds_takecdr(reader_, &data, 1, &info, DDS_ANY_STATE) == 1) {
+    for (int i = 0; i < kPassedOver; ++i) {
+      if (dds_takecdr(reader_, &data, 1, &info, DDS_ANY_STATE) != 1) return false;
       const bool good = info.valid_data && copy(*static_cast<const cyclone::Sample*>(data), payload);
       disposed_ += !info.valid_data;
       ddsi_serdata_unref(data);
@@ -196,6 +197,7 @@ class CycloneReader final : public Reader {
       events_.waits = true;  // more, perhaps
       return true;
     }
+    events_.arrived();
     return false;
   }
   WriterId from() const override {

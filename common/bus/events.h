@@ -50,6 +50,9 @@ class Inbound {
   std::vector<Disagreement> untold_;
 };
 
+/// So many samples that are nothing to take, a reader passes over at a time; it wakes its owner for the rest.
+inline constexpr int kPassedOver = 64;
+
 /// One end of a topic.  Kept until the participant is gone, so that a callback on its way finds it in place.
 struct Events {
   Events(const Topic& t, Inbound& i, bool writes) : topic(t), inbound(i), we_write(writes) {}

@@ -130,7 +130,8 @@ class FastReader final : public Reader {
     if (!events_.waits.exchange(false)) return false;
     RawSample sample{{}, &payload, 0};
     dds::SampleInfo info;
-    while (reader_.take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+    for (int i = 0; i < kPassedOver; ++i) {
+      if (reader_.take_next_sample(&sample, &info) != ReturnCode_t::RETCODE_OK) return false;
       if (!info.valid_data) {  // an instance's state changed
         ++disposed_;
         continue;
@@ -142,6 +143,7 @@ class FastReader final : public Reader {
       events_.waits = true;  // more, perhaps
       return true;
     }
+    events_.arrived();
     return false;
   }
   WriterId from() const override { return id_of(from_); }

@@ -269,6 +269,65 @@ TEST_P(Bus, EveryMessageArrivesAsItWasSent) {
   there_and_equal(wire::RunSummary());
 }
 
+/// Good or broken, what comes in a flood is taken in rounds; nobody sleeps while a round is due.
+TEST_P(Bus, AFloodIsTakenInRounds) {
+  constexpr int kRound = wire::Subscription<wire::TorqueCommand>::kRound, kAll = 3 * kRound + 8;
+  const auto a = from(17), b = to(17);
+  const auto writer = a->writer(topics::kCommand);
+  wire::Subscription<wire::TorqueCommand> commands(*b);
+  const auto witness = b->reader(topics::kCommand);
+  ASSERT_TRUE(wait_for(
+      *b, [&] { return writer->matched() == 2 && commands.matched() == 1 && witness->matched() == 1; }));
+  Payload good, p;
+  ASSERT_TRUE(wire::encode(wire::TorqueCommand(), good));
+  for (int i = 0; i < kAll; ++i) ASSERT_TRUE(writer->write(i % 4 == 3 ? good : sample(0, 1)));
+  int came = 0;
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (witness->take(p)) ++came;
+    return came == kAll;
+  }));
+  const auto at_once = [&] { return b->wait(std::chrono::steady_clock::now()); };
+  at_once();
+  wire::TorqueCommand m;
+  int taken = 0;
+  for (int round = 1; round <= 3; ++round) {
+    while (commands.take(m)) ++taken;
+    EXPECT_EQ(taken, round * kRound / 4);
+    EXPECT_TRUE(at_once()) << "round " << round;
+  }
+  EXPECT_TRUE(wait_for(*b, [&] {
+    while (commands.take(m)) ++taken;
+    return taken == kAll / 4;
+  }));
+  EXPECT_EQ(commands.undecodable(), 3U * kAll / 4);
+}
+
+TEST_P(Bus, WhatMustBeRefusedIsPassedOverInRounds) {
+  if (GetParam().from == Vendor::inproc) return;  // its writers and readers are of one topic
+  Topic larger = topics::kMode;
+  larger.delivery = Delivery::stream;
+  const Topic stream = larger;
+  larger.max_bytes *= 2;
+  const auto a = from(18), b = to(18);
+  const auto writer = a->writer(larger);
+  const auto reader = b->reader(stream), witness = b->reader(larger);
+  ASSERT_TRUE(wait_for(
+      *b, [&] { return writer->matched() == 2 && reader->matched() == 1 && witness->matched() == 1; }));
+  for (std::uint32_t i = 0; i < 100; ++i) ASSERT_TRUE(writer->write(sample(1, i, larger.max_bytes)));
+  ASSERT_TRUE(writer->write(sample(1, 100)));
+  Payload p = sample(1, 0);
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (number_in(p) != 100 && witness->take(p)) {
+    }
+    return number_in(p) == 100;
+  }));
+  EXPECT_FALSE(reader->take(p));
+  EXPECT_TRUE(b->wait(std::chrono::steady_clock::now())) << "there is more";
+  EXPECT_TRUE(wait_for(*b, [&] { return reader->take(p); }));
+  EXPECT_EQ(p, sample(1, 100));
+  EXPECT_EQ(reader->counters().refused, 100U);
+}
+
 /// What a reader knows of its writers: who wrote, who took back, who lives.
 TEST_P(Bus, TellsWhoWrote) {
   const auto a = from(13), b = to(13);
