@@ -57,6 +57,8 @@ enum class Ask : std::uint8_t {
 struct Endpoint {
   std::string topic = {}, type = {}, participant = {};  ///< participant: its name, where it gave one
   bool writes = false, reliable = false, latched = false, exclusive = false;
+  /// Offered by a writer, asked for by a reader; 0: nothing is.
+  std::chrono::microseconds deadline{}, liveliness{};
   WriterId id{};
 };
 
@@ -107,6 +109,8 @@ class Node {
   /// `depth` samples of each key wait for it, the newest; 0: as many as the topic's delivery says (a recorder
   /// wants more).
   virtual std::unique_ptr<Reader> reader(const Topic& topic, int depth = 0, Ask ask = Ask::data) = 0;
+  /// The last sentence that was told to NodeOptions::log; empty: none.
+  virtual std::string complaint() const = 0;
   /// The readers and writers of other participants on this domain, as far as they and their participants are
   /// known (inproc: all of the process).  Allocates; on the owner's thread.
   virtual std::vector<Endpoint> endpoints() = 0;

@@ -91,6 +91,11 @@ struct Deleter {
 using Listener = std::unique_ptr<dds_listener_t, Deleter>;
 using Qos = std::unique_ptr<dds_qos_t, Deleter>;
 
+/// Cyclone counts one policy more before the representation of data than the specification.
+int policy_of(std::uint32_t id) {
+  return id == DDS_DATA_REPRESENTATION_QOS_POLICY_ID ? 23 : static_cast<int>(id);
+}
+
 Listener listener_for(Events& events) {
   Listener l(dds_create_listener(&events));
   dds_lset_data_available(l.get(), [](dds_entity_t, void* arg) { events_of(arg).arrived(); });
@@ -103,11 +108,11 @@ Listener listener_for(Events& events) {
   });
   dds_lset_requested_incompatible_qos(
       l.get(), [](dds_entity_t, dds_requested_incompatible_qos_status_t status, void* arg) {
-        events_of(arg).incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
+        events_of(arg).incompatible_with(policy_of(status.last_policy_id), status.total_count_change);
       });
   dds_lset_offered_incompatible_qos(
       l.get(), [](dds_entity_t, dds_offered_incompatible_qos_status_t status, void* arg) {
-        events_of(arg).incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
+        events_of(arg).incompatible_with(policy_of(status.last_policy_id), status.total_count_change);
       });
   dds_lset_sample_lost(l.get(), [](dds_entity_t, dds_sample_lost_status_t status, void* arg) {
     Events::add(events_of(arg).lost, status.total_count_change);
@@ -266,12 +271,21 @@ std::string name_of(const dds_builtintopic_participant_t& p) {
   return out;
 }
 
+std::chrono::microseconds finite(dds_duration_t ns) {
+  return std::chrono::microseconds(ns == DDS_INFINITY ? 0 : (ns + 500) / 1000);
+}
+
 Endpoint endpoint_of(const dds_builtintopic_endpoint_t& e, bool writes) {
   Endpoint out{.topic = e.topic_name, .type = e.type_name, .writes = writes};
   dds_reliability_kind_t reliability = DDS_RELIABILITY_BEST_EFFORT;
   dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE;
   dds_ownership_kind_t ownership = DDS_OWNERSHIP_SHARED;
-  dds_duration_t blocking = 0;
+  dds_liveliness_kind_t liveliness = DDS_LIVELINESS_AUTOMATIC;
+  dds_duration_t blocking = 0, deadline = DDS_INFINITY, lease = DDS_INFINITY;
+  dds_qget_deadline(e.qos, &deadline);
+  dds_qget_liveliness(e.qos, &liveliness, &lease);
+  out.deadline = finite(deadline);
+  out.liveliness = finite(lease);
   dds_qget_reliability(e.qos, &reliability, &blocking);
   dds_qget_durability(e.qos, &durability);
   dds_qget_ownership(e.qos, &ownership);
@@ -304,7 +318,7 @@ class CycloneNode final : public Node {
   }
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
-    Events& events = make_events(topic, true);
+    Events& events = make_events(topic, true, Ask::data);
     const dds_entity_t made = dds_create_writer(participant_, topic_for(topic).entity,
                                                 qos_for(topic, true, depth_of(topic.delivery), true).get(),
                                                 listener_for(events).get());
@@ -312,7 +326,7 @@ class CycloneNode final : public Node {
   }
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
-    Events& events = make_events(topic, false);
+    Events& events = make_events(topic, false, ask);
     if (depth <= 0) depth = depth_of(topic.delivery);
     const dds_entity_t made = dds_create_reader(participant_, topic_for(topic).entity,
                                                 qos_for(topic, false, depth, ask == Ask::promises).get(),
@@ -344,17 +358,18 @@ class CycloneNode final : public Node {
     return all;
   }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }
+  std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
     return inbound_.wait(deadline, options_.awake, [this](const Disagreement& d) {
-      if (options_.log) options_.log(incompatible_sentence(d, Vendor::cyclonedds, endpoints()));
+      complaints_.tell(d, Vendor::cyclonedds, endpoints(), options_.log);
     });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
 
  private:
-  Events& make_events(const Topic& topic, bool writes) {
-    events_.push_back(std::make_unique<Events>(topic, inbound_, writes));
+  Events& make_events(const Topic& topic, bool writes, Ask ask) {
+    events_.push_back(std::make_unique<Events>(topic, inbound_, writes, ask));
     return *events_.back();
   }
 
@@ -368,6 +383,7 @@ class CycloneNode final : public Node {
   const NodeOptions options_;
   const std::shared_ptr<Domain> domain_;
   Inbound inbound_;
+  Complaints complaints_;
   std::vector<std::unique_ptr<Events>> events_;  // until the participant is gone
   std::map<std::string_view, cyclone::CycloneTopic> topics_;
   dds_entity_t participant_ = 0;

@@ -218,14 +218,14 @@ class FastNode final : public Node {
   bool started() const { return publisher_ != nullptr && subscriber_ != nullptr; }
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
-    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, inbound_, true));
+    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, inbound_, true, Ask::data));
     auto& made = checked(publisher_->create_datawriter(&topic_for(topic), writer_qos(topic), &events),
                          "writer", topic);
     return std::make_unique<FastWriter>(topic, *publisher_, made, events);
   }
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
-    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false));
+    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false, ask));
     auto& made =
         checked(subscriber_->create_datareader(&topic_for(topic), reader_qos(topic, depth, ask), &events),
                 "reader", topic);
@@ -234,10 +234,11 @@ class FastNode final : public Node {
 
   std::vector<Endpoint> endpoints() override { return neighbours_.all(); }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }
+  std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
     // Fast DDS's receiving threads wait for its locks: they are faster where the owner sleeps.
     return inbound_.wait(deadline, {}, [this](const Disagreement& d) {
-      if (options_.log) options_.log(incompatible_sentence(d, Vendor::fastdds, endpoints()));
+      complaints_.tell(d, Vendor::fastdds, endpoints(), options_.log);
     });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
@@ -264,6 +265,7 @@ class FastNode final : public Node {
   const NodeOptions options_;
   const ParticipantNumber number_;
   Inbound inbound_;
+  Complaints complaints_;
   Neighbours neighbours_;
   std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
   std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
