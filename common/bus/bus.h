@@ -127,6 +127,9 @@ class Node {
 /// free participant index, vendor's own refusal.
 Result<std::unique_ptr<Node>, Problem> open(const NodeOptions& options);
 
+/// The version of the vendor's library that hamel was built with; inproc: empty.
+std::string library_version(Vendor vendor);
+
 /// "fastdds" -> Vendor; the error lists the names.
 Result<Vendor, Problem> vendor_from(std::string_view name);
 

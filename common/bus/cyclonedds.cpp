@@ -16,6 +16,7 @@
 #include "common/bus/events.h"
 #include "common/bus/payload.h"
 #include "dds/dds.h"
+#include "dds/version.h"
 
 namespace hamel::bus {
 namespace {
@@ -390,6 +391,8 @@ class CycloneNode final : public Node {
 };
 
 }  // namespace
+
+std::string cyclonedds_version() { return DDS_VERSION; }
 
 Result<std::unique_ptr<Node>, Problem> open_cyclonedds(const NodeOptions& options) {
   LastWords::get();

@@ -4,6 +4,7 @@
 /// on its way when a reader or writer leaves finds them in place.
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/config.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <atomic>
@@ -348,6 +349,8 @@ dds::DomainParticipantQos participant_qos(const NodeOptions& options, const Inte
 }
 
 }  // namespace
+
+std::string fastdds_version() { return FASTRTPS_VERSION_STR; }
 
 Result<std::unique_ptr<Node>, Problem> open_fastdds(const NodeOptions& options) {
   const auto interface = find_interface(options.interface_name);
