@@ -19,7 +19,8 @@ struct BenchBusArgs {
 
 /// Times of one way and round trip: bare UDP, inproc, each vendor and both mixed pairs, in one process and in
 /// two; recovery after kill -9; lateness of a 1 kHz loop beside a busy process; lockstep steps a second. With
-/// `check` 1 where a sample was lost or lockstep is slower than half of what UDP's round trip would allow.
+/// `check` 1 where a sample was lost, a restarted process was not back within a second (between vendors:
+/// two), or lockstep is slower than half of what UDP's round trip would allow.
 int bench_bus(const BenchBusArgs& args);
 
 }  // namespace hamel::client

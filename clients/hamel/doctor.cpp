@@ -1,9 +1,11 @@
 #include "clients/hamel/doctor.h"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/timex.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -41,12 +43,37 @@ std::string first_line(const std::string& path) {
   return line;
 }
 
+/// Whether a datagram to the group of DDS's discovery, sent by this interface, comes back to this host.
+bool multicast_comes_back(in_addr interface) {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = inet_addr("239.255.0.1");
+  socklen_t length = sizeof at;
+  const ip_mreq group{at.sin_addr, interface};
+  const timeval limit{1, 0};
+  std::uint64_t sent = static_cast<std::uint64_t>(getpid()) << 32 | 0x68616d65, got = 0;
+  bool back = bind(fd, reinterpret_cast<sockaddr*>(&at), length) == 0 &&
+              getsockname(fd, reinterpret_cast<sockaddr*>(&at), &length) == 0 &&
+              setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group) == 0 &&
+              setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &interface, sizeof interface) == 0 &&
+              setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit) == 0 &&
+              sendto(fd, &sent, sizeof sent, 0, reinterpret_cast<sockaddr*>(&at), length) == sizeof sent;
+  back = back && recv(fd, &got, sizeof got, 0) == sizeof got && got == sent;
+  close(fd);
+  return back;
+}
+
 void look_at_interfaces(const runtime::BusOptions& o, Findings& out) {
   ifaddrs* list = nullptr;
   if (getifaddrs(&list) != 0) return;
   std::map<std::string, unsigned> flags;
+  std::map<std::string, in_addr> addresses;
   for (const ifaddrs* i = list; i != nullptr; i = i->ifa_next)
-    if (i->ifa_addr != nullptr && i->ifa_addr->sa_family == AF_INET) flags[i->ifa_name] = i->ifa_flags;
+    if (i->ifa_addr != nullptr && i->ifa_addr->sa_family == AF_INET) {
+      flags[i->ifa_name] = i->ifa_flags;
+      addresses[i->ifa_name] = reinterpret_cast<const sockaddr_in*>(i->ifa_addr)->sin_addr;
+    }
   freeifaddrs(list);
   bool loopback = false;
   for (const auto& [name, f] : flags) {
@@ -57,6 +84,11 @@ void look_at_interfaces(const runtime::BusOptions& o, Findings& out) {
                                          : "no multicast: give every host as --peer";
     out.push_back({up ? Verdict::good : Verdict::note, "interface " + name, up ? mode : "is down",
                    up ? "" : "ip link set " + name + " up"});
+    if (!up || !multicast || lo) continue;
+    const bool back = multicast_comes_back(addresses[name]);
+    out.push_back({back ? Verdict::good : Verdict::note, "multicast on " + name,
+                   back ? "tried: a datagram came back" : "tried: nothing came back within a second",
+                   back ? "" : "give every host as --peer, or open 239.255.0.1 in the firewall"});
   }
   if (!loopback) out.push_back({Verdict::wrong, "interface lo", "the loopback is down", "ip link set lo up"});
   if (!o.interface_name.empty() && !flags.contains(o.interface_name))
@@ -222,6 +254,9 @@ void look_at_services(const runtime::BusOptions& o, Findings& out) {
 int doctor(const DoctorArgs& args) {
   Findings all;
   all.push_back({Verdict::good, "version", runtime::version(), ""});
+  for (const auto vendor : {bus::Vendor::fastdds, bus::Vendor::cyclonedds})
+    all.push_back(
+        {Verdict::good, fmt::format("{} version", bus::to_string(vendor)), bus::library_version(vendor), ""});
   look_at_interfaces(args.bus, all);
   look_at_ports(args.bus, all);
   look_at_bus(args.bus, all);

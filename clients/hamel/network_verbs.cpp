@@ -37,7 +37,7 @@ void NetworkVerbs::add_bench(CLI::App& app) {
   bench_bus_->add_option("--cpu", bench_args_.cpu, "everything on this processor");
   bench_bus_->add_flag("--json", bench_args_.json, "one JSON object");
   bench_bus_->add_flag("--assert", bench_args_.check,
-                       "exit code 1 where a sample is lost or lockstep is slow");
+                       "exit code 1 where a sample is lost, a restart takes long or lockstep is slow");
   bench_bus_->add_option("--answer", bench_args_.answer)->group("");
 }
 

@@ -9,4 +9,7 @@ Result<std::unique_ptr<Node>, Problem> open_inproc(const NodeOptions& options);
 Result<std::unique_ptr<Node>, Problem> open_fastdds(const NodeOptions& options);
 Result<std::unique_ptr<Node>, Problem> open_cyclonedds(const NodeOptions& options);
 
+std::string fastdds_version();
+std::string cyclonedds_version();
+
 }  // namespace hamel::bus

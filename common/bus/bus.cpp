@@ -21,6 +21,11 @@ const char* to_string(Vendor v) {
   return "?";
 }
 
+std::string library_version(Vendor vendor) {
+  if (vendor == Vendor::fastdds) return fastdds_version();
+  return vendor == Vendor::cyclonedds ? cyclonedds_version() : "";
+}
+
 Result<Vendor, Problem> vendor_from(std::string_view name) {
   for (const Vendor v : kVendors)
     if (name == to_string(v)) return v;

@@ -57,6 +57,8 @@ enum class Ask : std::uint8_t {
 struct Endpoint {
   std::string topic = {}, type = {}, participant = {};  ///< participant: its name, where it gave one
   bool writes = false, reliable = false, latched = false, exclusive = false;
+  /// Offered by a writer, asked for by a reader; 0: nothing is.
+  std::chrono::microseconds deadline{}, liveliness{};
   WriterId id{};
 };
 
@@ -86,8 +88,9 @@ class Writer {
 class Reader {
  public:
   virtual ~Reader() = default;
-  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits. Samples
-  /// of one writer and key come in the order they were written; between keys DDS promises no order.
+  /// Moves the oldest waiting sample into `payload` (its capacity is reused).  False when none waits, or none
+  /// was found among many that had to be refused (the node's wait() then returns at once).  Samples of one
+  /// writer and key come in the order they were written; between keys DDS promises no order.
   virtual bool take(Payload& payload) = 0;
   /// The writer of the sample that take() gave last.
   virtual WriterId from() const = 0;
@@ -106,6 +109,8 @@ class Node {
   /// `depth` samples of each key wait for it, the newest; 0: as many as the topic's delivery says (a recorder
   /// wants more).
   virtual std::unique_ptr<Reader> reader(const Topic& topic, int depth = 0, Ask ask = Ask::data) = 0;
+  /// The last sentence that was told to NodeOptions::log; empty: none.
+  virtual std::string complaint() const = 0;
   /// The readers and writers of other participants on this domain, as far as they and their participants are
   /// known (inproc: all of the process).  Allocates; on the owner's thread.
   virtual std::vector<Endpoint> endpoints() = 0;
@@ -121,6 +126,9 @@ class Node {
 /// Opens a node, or says in one sentence what is wrong: interface absent or down, domain out of range, no
 /// free participant index, vendor's own refusal.
 Result<std::unique_ptr<Node>, Problem> open(const NodeOptions& options);
+
+/// The version of the vendor's library that hamel was built with; inproc: empty.
+std::string library_version(Vendor vendor);
 
 /// "fastdds" -> Vendor; the error lists the names.
 Result<Vendor, Problem> vendor_from(std::string_view name);

@@ -7,6 +7,7 @@
 #include <new>
 #include <string>
 
+#include "common/bus/network.h"
 #include "common/bus/payload.h"
 #include "dds/ddsi/ddsi_sertype.h"
 #include "dds/ddsi/q_radmin.h"
@@ -14,12 +15,29 @@
 #include "dds/ddsrt/mh3.h"
 
 namespace hamel::bus::cyclone {
+
+bool Keys::admits(std::uint32_t key) {
+  const std::lock_guard lock(mutex_);
+  if (instances_.size() < kMaxInstances || instances_.contains(key)) return true;
+  ++dropped_;
+  return false;
+}
+void Keys::add(std::uint32_t key) {
+  const std::lock_guard lock(mutex_);
+  ++instances_[key];
+}
+void Keys::remove(std::uint32_t key) {
+  const std::lock_guard lock(mutex_);
+  if (const auto known = instances_.find(key); --known->second == 0) instances_.erase(known);
+}
+
 namespace {
 
 static_assert(alignof(Sample) <= alignof(std::max_align_t));
 
 struct Type : ddsi_sertype {
   const Topic* topic;
+  std::shared_ptr<Keys> keys = std::make_shared<Keys>();
 };
 
 const Topic& topic_of(const ddsi_sertype* type) { return *static_cast<const Type*>(type)->topic; }
@@ -40,6 +58,7 @@ Sample* make(const ddsi_sertype* type, ddsi_serdata_kind kind, std::size_t size,
   if (block == nullptr) return nullptr;
   auto* s = new (block) Sample;
   ddsi_serdata_init(s, type, kind);
+  s->keys = static_cast<const Type*>(type)->keys;
   s->key = 0;
   s->size = static_cast<std::uint32_t>(padded(size));
   s->claimed = static_cast<std::uint32_t>(claimed);
@@ -53,6 +72,13 @@ ddsi_serdata* finish(Sample* s) {
   const auto key = big_endian(s->key);
   s->hash = ddsrt_mh3(key.data(), key.size(), 0) ^ s->type->serdata_basehash;
   return s;
+}
+
+/// Null where the key is one too many: Cyclone passes over the sample.
+ddsi_serdata* admitted(ddsi_serdata* d) {
+  if (d == nullptr || !topic_of(d->type).keyed || sample(d).keys->admits(sample(d).key)) return d;
+  ddsi_serdata_unref(d);
+  return nullptr;
 }
 
 /// How many of `size` incoming bytes are kept: a sample over the topic's bound is cut to its key.
@@ -75,7 +101,7 @@ ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind, c
     std::memcpy(s->bytes() + at, from + (at - fragment->min), until - at);
     at = until;
   }
-  return finish(s);
+  return admitted(finish(s));
 }
 
 ddsi_serdata* from_vectors(const ddsi_sertype* type, ddsi_serdata_kind kind, ddsrt_msg_iovlen_t n,
@@ -89,7 +115,7 @@ ddsi_serdata* from_vectors(const ddsi_sertype* type, ddsi_serdata_kind kind, dds
     std::memcpy(s->bytes() + at, vectors[i].iov_base, part);
     at += part;
   }
-  return finish(s);
+  return admitted(finish(s));
 }
 
 /// A key alone, as it stands in dispose messages.
@@ -102,7 +128,7 @@ ddsi_serdata* from_key(const ddsi_sertype* type, std::span<const std::byte, kKey
 }
 
 ddsi_serdata* from_keyhash(const ddsi_sertype* type, const ddsi_keyhash* hash) {
-  return from_key(type, std::as_bytes(std::span(hash->value)).first<kKeyBytes>());
+  return admitted(from_key(type, std::as_bytes(std::span(hash->value)).first<kKeyBytes>()));
 }
 
 ddsi_serdata* from_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, const void* data) {
@@ -115,10 +141,20 @@ ddsi_serdata* from_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, cons
   return finish(s);
 }
 
+/// Cyclone makes one of these for each instance, and frees it with the instance.
 ddsi_serdata* to_untyped(const ddsi_serdata* d) {
   ddsi_serdata* s = from_key(d->type, big_endian(sample(d).key));
-  if (s != nullptr) s->type = nullptr;
+  if (s == nullptr) return s;
+  s->type = nullptr;
+  sample(d).keys->add(sample(d).key);
   return s;
+}
+
+void free_sample(ddsi_serdata* d) {
+  auto* s = static_cast<Sample*>(d);
+  if (s->type == nullptr) s->keys->remove(s->key);
+  s->~Sample();
+  std::free(s);
 }
 
 void get_keyhash(const ddsi_serdata* d, ddsi_keyhash* hash, bool force_md5) {
@@ -134,7 +170,9 @@ void get_keyhash(const ddsi_serdata* d, ddsi_keyhash* hash, bool force_md5) {
 
 ddsi_serdata_ops sample_ops() {
   ddsi_serdata_ops ops{};
-  ops.eqkey = [](const ddsi_serdata* a, const ddsi_serdata* b) { return sample(a).key == sample(b).key; };
+  ops.eqkey = [](const ddsi_serdata* a, const ddsi_serdata* b) {
+    return sample(a).key == sample(b).key && sample(a).keys == sample(b).keys;
+  };
   ops.get_size = [](const ddsi_serdata* d) { return sample(d).size; };
   ops.from_ser = from_fragments;
   ops.from_ser_iov = from_vectors;
@@ -154,7 +192,7 @@ ddsi_serdata_ops sample_ops() {
   ops.untyped_to_sample = [](const ddsi_sertype*, const ddsi_serdata*, void*, void**, void*) {
     return false;
   };
-  ops.free = [](ddsi_serdata* d) { std::free(static_cast<Sample*>(d)); };
+  ops.free = free_sample;
   ops.print = [](const ddsi_sertype*, const ddsi_serdata* d, char* text, std::size_t n) {
     return static_cast<std::size_t>(
         std::snprintf(text, n, "%u bytes, key %u", sample(d).size, sample(d).key));
@@ -188,7 +226,7 @@ ddsi_sertype_ops type_ops() {
 
 }  // namespace
 
-dds_entity_t create_topic(dds_entity_t participant, const Topic& topic) {
+CycloneTopic create_topic(dds_entity_t participant, const Topic& topic) {
   static const ddsi_serdata_ops of_samples = sample_ops();
   static const ddsi_sertype_ops of_type = type_ops();
   auto* type = new Type{};
@@ -198,8 +236,11 @@ dds_entity_t create_topic(dds_entity_t participant, const Topic& topic) {
   ddsi_sertype* handed_over = type;
   const dds_entity_t made = dds_create_topic_sertype(participant, std::string(topic.name).c_str(),
                                                      &handed_over, nullptr, nullptr, nullptr);
-  if (made < 0) ddsi_sertype_unref(type);
-  return made;
+  if (made < 0) {
+    ddsi_sertype_unref(type);
+    return {made, nullptr};
+  }
+  return {made, static_cast<const Type*>(handed_over)->keys};  // of a type that was there before, perhaps
 }
 
 }  // namespace hamel::bus::cyclone

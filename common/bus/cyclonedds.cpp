@@ -16,6 +16,7 @@
 #include "common/bus/events.h"
 #include "common/bus/payload.h"
 #include "dds/dds.h"
+#include "dds/version.h"
 
 namespace hamel::bus {
 namespace {
@@ -91,6 +92,11 @@ struct Deleter {
 using Listener = std::unique_ptr<dds_listener_t, Deleter>;
 using Qos = std::unique_ptr<dds_qos_t, Deleter>;
 
+/// Cyclone counts one policy more before the representation of data than the specification.
+int policy_of(std::uint32_t id) {
+  return id == DDS_DATA_REPRESENTATION_QOS_POLICY_ID ? 23 : static_cast<int>(id);
+}
+
 Listener listener_for(Events& events) {
   Listener l(dds_create_listener(&events));
   dds_lset_data_available(l.get(), [](dds_entity_t, void* arg) { events_of(arg).arrived(); });
@@ -103,11 +109,11 @@ Listener listener_for(Events& events) {
   });
   dds_lset_requested_incompatible_qos(
       l.get(), [](dds_entity_t, dds_requested_incompatible_qos_status_t status, void* arg) {
-        events_of(arg).incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
+        events_of(arg).incompatible_with(policy_of(status.last_policy_id), status.total_count_change);
       });
   dds_lset_offered_incompatible_qos(
       l.get(), [](dds_entity_t, dds_offered_incompatible_qos_status_t status, void* arg) {
-        events_of(arg).incompatible_with(static_cast<int>(status.last_policy_id), status.total_count_change);
+        events_of(arg).incompatible_with(policy_of(status.last_policy_id), status.total_count_change);
       });
   dds_lset_sample_lost(l.get(), [](dds_entity_t, dds_sample_lost_status_t status, void* arg) {
     Events::add(events_of(arg).lost, status.total_count_change);
@@ -130,7 +136,6 @@ Qos qos_for(const Topic& topic, bool writes, int depth, bool promises) {
   dds_qset_reliability(q.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_durability(q.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, depth);
-  dds_qset_resource_limits(q.get(), kMaxInstances * depth, kMaxInstances, depth);
   if (promises && topic.rate_hz > 0) dds_qset_deadline(q.get(), DDS_MSECS((topic.stale + more).count()));
   if (promises) dds_qset_liveliness(q.get(), DDS_LIVELINESS_AUTOMATIC, DDS_MSECS((kAlive + more).count()));
   if (writes) dds_qset_writer_data_lifecycle(q.get(), false);
@@ -172,8 +177,13 @@ class CycloneWriter final : public Writer {
 
 class CycloneReader final : public Reader {
  public:
-  CycloneReader(const Topic& topic, dds_entity_t reader, Events& events)
-      : topic_(topic), reader_(reader), events_(events) {}
+  CycloneReader(const Topic& topic, dds_entity_t reader, Events& events,
+                std::shared_ptr<const cyclone::Keys> keys)
+      : topic_(topic),
+        reader_(reader),
+        events_(events),
+        keys_(std::move(keys)),
+        dropped_before_(keys_->dropped()) {}
   ~CycloneReader() override {
     dds_set_listener(reader_, nullptr);
     dds_delete(reader_);
@@ -183,7 +193,8 @@ class CycloneReader final : public Reader {
     if (!events_.waits.exchange(false)) return false;
     ddsi_serdata* data = nullptr;
     dds_sample_info_t info;
-    while (dds_takecdr(reader_, &data, 1, &info, DDS_ANY_STATE) == 1) {
+    for (int i = 0; i < kPassedOver; ++i) {
+      if (dds_takecdr(reader_, &data, 1, &info, DDS_ANY_STATE) != 1) return false;
       const bool good = info.valid_data && copy(*static_cast<const cyclone::Sample*>(data), payload);
       disposed_ += !info.valid_data;
       ddsi_serdata_unref(data);
@@ -192,6 +203,7 @@ class CycloneReader final : public Reader {
       events_.waits = true;  // more, perhaps
       return true;
     }
+    events_.arrived();
     return false;
   }
   WriterId from() const override {
@@ -207,7 +219,11 @@ class CycloneReader final : public Reader {
     return id;
   }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return events_.counters(samples_, refused_, disposed_); }
+  Counters counters() const override {
+    Counters c = events_.counters(samples_, refused_, disposed_);
+    c.lost += keys_->dropped() - dropped_before_;
+    return c;
+  }
 
  private:
   bool copy(const cyclone::Sample& sample, Payload& payload) {
@@ -221,6 +237,8 @@ class CycloneReader final : public Reader {
   const Topic& topic_;
   const dds_entity_t reader_;
   Events& events_;
+  const std::shared_ptr<const cyclone::Keys> keys_;
+  const std::uint64_t dropped_before_;
   dds_instance_handle_t from_ = 0;
   mutable std::map<dds_instance_handle_t, WriterId> ids_;
   std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0;
@@ -254,12 +272,21 @@ std::string name_of(const dds_builtintopic_participant_t& p) {
   return out;
 }
 
+std::chrono::microseconds finite(dds_duration_t ns) {
+  return std::chrono::microseconds(ns == DDS_INFINITY ? 0 : (ns + 500) / 1000);
+}
+
 Endpoint endpoint_of(const dds_builtintopic_endpoint_t& e, bool writes) {
   Endpoint out{.topic = e.topic_name, .type = e.type_name, .writes = writes};
   dds_reliability_kind_t reliability = DDS_RELIABILITY_BEST_EFFORT;
   dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE;
   dds_ownership_kind_t ownership = DDS_OWNERSHIP_SHARED;
-  dds_duration_t blocking = 0;
+  dds_liveliness_kind_t liveliness = DDS_LIVELINESS_AUTOMATIC;
+  dds_duration_t blocking = 0, deadline = DDS_INFINITY, lease = DDS_INFINITY;
+  dds_qget_deadline(e.qos, &deadline);
+  dds_qget_liveliness(e.qos, &liveliness, &lease);
+  out.deadline = finite(deadline);
+  out.liveliness = finite(lease);
   dds_qget_reliability(e.qos, &reliability, &blocking);
   dds_qget_durability(e.qos, &durability);
   dds_qget_ownership(e.qos, &ownership);
@@ -292,20 +319,21 @@ class CycloneNode final : public Node {
   }
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
-    Events& events = make_events(topic, true);
-    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic),
+    Events& events = make_events(topic, true, Ask::data);
+    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic).entity,
                                                 qos_for(topic, true, depth_of(topic.delivery), true).get(),
                                                 listener_for(events).get());
     return std::make_unique<CycloneWriter>(topic, checked(made, "writer", topic), events);
   }
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
-    Events& events = make_events(topic, false);
+    Events& events = make_events(topic, false, ask);
     if (depth <= 0) depth = depth_of(topic.delivery);
-    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic),
+    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic).entity,
                                                 qos_for(topic, false, depth, ask == Ask::promises).get(),
                                                 listener_for(events).get());
-    return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events);
+    return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events,
+                                           topic_for(topic).keys);
   }
 
   std::vector<Endpoint> endpoints() override {
@@ -331,35 +359,40 @@ class CycloneNode final : public Node {
     return all;
   }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }
+  std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
     return inbound_.wait(deadline, options_.awake, [this](const Disagreement& d) {
-      if (options_.log) options_.log(incompatible_sentence(d, Vendor::cyclonedds, endpoints()));
+      complaints_.tell(d, Vendor::cyclonedds, endpoints(), options_.log);
     });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
 
  private:
-  Events& make_events(const Topic& topic, bool writes) {
-    events_.push_back(std::make_unique<Events>(topic, inbound_, writes));
+  Events& make_events(const Topic& topic, bool writes, Ask ask) {
+    events_.push_back(std::make_unique<Events>(topic, inbound_, writes, ask));
     return *events_.back();
   }
 
-  dds_entity_t topic_for(const Topic& topic) {
-    dds_entity_t& made = topics_[topic.name];
-    if (made <= 0) made = checked(cyclone::create_topic(participant_, topic), "topic", topic);
+  const cyclone::CycloneTopic& topic_for(const Topic& topic) {
+    cyclone::CycloneTopic& made = topics_[topic.name];
+    if (made.entity <= 0) made = cyclone::create_topic(participant_, topic);
+    checked(made.entity, "topic", topic);
     return made;
   }
 
   const NodeOptions options_;
   const std::shared_ptr<Domain> domain_;
   Inbound inbound_;
+  Complaints complaints_;
   std::vector<std::unique_ptr<Events>> events_;  // until the participant is gone
-  std::map<std::string_view, dds_entity_t> topics_;
+  std::map<std::string_view, cyclone::CycloneTopic> topics_;
   dds_entity_t participant_ = 0;
 };
 
 }  // namespace
+
+std::string cyclonedds_version() { return DDS_VERSION; }
 
 Result<std::unique_ptr<Node>, Problem> open_cyclonedds(const NodeOptions& options) {
   LastWords::get();

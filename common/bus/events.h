@@ -21,7 +21,7 @@ class Inbound {
   void disagree(const Disagreement& d) {
     {
       const std::lock_guard lock(mutex_);
-      untold_.push_back(d);
+      if (std::find(untold_.begin(), untold_.end(), d) == untold_.end()) untold_.push_back(d);
     }
     any_ = true;
     notifier.notify();
@@ -50,12 +50,15 @@ class Inbound {
   std::vector<Disagreement> untold_;
 };
 
+/// So many samples that are nothing to take, a reader passes over at a time; it wakes its owner for the rest.
+inline constexpr int kPassedOver = 64;
+
 /// One end of a topic.  Kept until the participant is gone, so that a callback on its way finds it in place.
 struct Events {
-  Events(const Topic& t, Inbound& i, bool writes) : topic(t), inbound(i), we_write(writes) {}
+  Events(const Topic& t, Inbound& i, bool writes, Ask a) : topic(t), inbound(i), we_write(writes), ask(a) {}
 
   void incompatible_with(int policy, std::int32_t change) {
-    if (!said.exchange(true)) inbound.disagree({&topic, we_write, policy});
+    inbound.disagree({&topic, we_write, ask, policy});
     incompatible += static_cast<std::uint64_t>(std::max(change, 0));
     inbound.count(change);
   }
@@ -74,9 +77,9 @@ struct Events {
   const Topic& topic;
   Inbound& inbound;
   const bool we_write;
+  const Ask ask;
   std::atomic<int> matched{0};
   std::atomic<std::uint64_t> incompatible{0}, lost{0}, late{0}, silent{0};
-  std::atomic<bool> said{false};
   std::atomic<bool> waits{true};  ///< there may be something to take: asking the vendor is dear
 };
 

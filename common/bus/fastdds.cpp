@@ -4,6 +4,7 @@
 /// on its way when a reader or writer leaves finds them in place.
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/config.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <atomic>
@@ -48,9 +49,9 @@ Qos common_qos(const Topic& topic, int depth) {
   qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = depth;
-  qos.resource_limits().max_instances = kMaxInstances;
+  qos.resource_limits().max_instances = 0;  // as many as we name ourselves
   qos.resource_limits().max_samples_per_instance = qos.history().depth;
-  qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
+  qos.resource_limits().max_samples = 0;
   qos.resource_limits().allocated_samples = latched ? 4 : 32;
   qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   qos.data_sharing().off();
@@ -64,6 +65,16 @@ void promise(Qos& qos, const Topic& topic, std::chrono::milliseconds more = {}) 
   qos.liveliness().kind = dds::AUTOMATIC_LIVELINESS_QOS;
   qos.liveliness().lease_duration = duration(kAlive + more);
   qos.liveliness().announcement_period = duration(kAlive / 3);
+}
+
+/// A stranger's samples of a key too many are refused, again and again, until an instance goes with its last
+/// writer: that holds up the stranger only.
+dds::DataReaderQos reader_qos(const Topic& topic, int depth, Ask ask) {
+  auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
+  qos.resource_limits().max_instances = kMaxInstances;
+  qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
+  if (ask == Ask::promises) promise(qos, topic, kRounding);
+  return qos;
 }
 
 dds::DataWriterQos writer_qos(const Topic& topic) {
@@ -120,7 +131,8 @@ class FastReader final : public Reader {
     if (!events_.waits.exchange(false)) return false;
     RawSample sample{{}, &payload, 0};
     dds::SampleInfo info;
-    while (reader_.take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+    for (int i = 0; i < kPassedOver; ++i) {
+      if (reader_.take_next_sample(&sample, &info) != ReturnCode_t::RETCODE_OK) return false;
       if (!info.valid_data) {  // an instance's state changed
         ++disposed_;
         continue;
@@ -132,6 +144,7 @@ class FastReader final : public Reader {
       events_.waits = true;  // more, perhaps
       return true;
     }
+    events_.arrived();
     return false;
   }
   WriterId from() const override { return id_of(from_); }
@@ -206,26 +219,27 @@ class FastNode final : public Node {
   bool started() const { return publisher_ != nullptr && subscriber_ != nullptr; }
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
-    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, inbound_, true));
+    auto& events = keep(writer_events_, std::make_unique<WriterEvents>(topic, inbound_, true, Ask::data));
     auto& made = checked(publisher_->create_datawriter(&topic_for(topic), writer_qos(topic), &events),
                          "writer", topic);
     return std::make_unique<FastWriter>(topic, *publisher_, made, events);
   }
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
-    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false));
-    auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
-    if (ask == Ask::promises) promise(qos, topic, kRounding);
-    auto& made = checked(subscriber_->create_datareader(&topic_for(topic), qos, &events), "reader", topic);
+    auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false, ask));
+    auto& made =
+        checked(subscriber_->create_datareader(&topic_for(topic), reader_qos(topic, depth, ask), &events),
+                "reader", topic);
     return std::make_unique<FastReader>(topic, *subscriber_, made, events);
   }
 
   std::vector<Endpoint> endpoints() override { return neighbours_.all(); }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }
+  std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
     // Fast DDS's receiving threads wait for its locks: they are faster where the owner sleeps.
     return inbound_.wait(deadline, {}, [this](const Disagreement& d) {
-      if (options_.log) options_.log(incompatible_sentence(d, Vendor::fastdds, endpoints()));
+      complaints_.tell(d, Vendor::fastdds, endpoints(), options_.log);
     });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
@@ -252,6 +266,7 @@ class FastNode final : public Node {
   const NodeOptions options_;
   const ParticipantNumber number_;
   Inbound inbound_;
+  Complaints complaints_;
   Neighbours neighbours_;
   std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
   std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
@@ -334,6 +349,8 @@ dds::DomainParticipantQos participant_qos(const NodeOptions& options, const Inte
 }
 
 }  // namespace
+
+std::string fastdds_version() { return FASTRTPS_VERSION_STR; }
 
 Result<std::unique_ptr<Node>, Problem> open_fastdds(const NodeOptions& options) {
   const auto interface = find_interface(options.interface_name);

@@ -24,6 +24,11 @@ inline WriterId id_of(const rtps::GUID_t& guid) {
   return id;
 }
 
+inline std::chrono::microseconds finite(const eprosima::fastrtps::Duration_t& d) {
+  if (d == eprosima::fastrtps::c_TimeInfinite) return {};
+  return std::chrono::seconds(d.seconds) + std::chrono::microseconds((d.nanosec + 500) / 1000);
+}
+
 struct WriterEvents final : Events, dds::DataWriterListener {
   using Events::Events;
   void on_publication_matched(dds::DataWriter*, const dds::PublicationMatchedStatus& status) override {
@@ -47,6 +52,10 @@ struct ReaderEvents final : Events, dds::DataReaderListener {
   }
   void on_sample_lost(dds::DataReader*, const dds::SampleLostStatus& status) override {
     add(lost, status.total_count_change);
+  }
+  /// A key too many, or more samples than are kept.
+  void on_sample_rejected(dds::DataReader*, const dds::SampleRejectedStatus& status) override {
+    add(lost, static_cast<std::int32_t>(status.total_count_change));
   }
   void on_requested_deadline_missed(dds::DataReader*,
                                     const dds::RequestedDeadlineMissedStatus& status) override {
@@ -99,6 +108,8 @@ class Neighbours final : public dds::DomainParticipantListener {
     e.reliable = data.m_qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS;
     e.latched = data.m_qos.m_durability.kind != dds::VOLATILE_DURABILITY_QOS;
     e.exclusive = data.m_qos.m_ownership.kind == dds::EXCLUSIVE_OWNERSHIP_QOS;
+    e.deadline = finite(data.m_qos.m_deadline.period);
+    e.liveliness = finite(data.m_qos.m_liveliness.lease_duration);
     e.id = id_of(data.guid());
     if (ends_.size() < kMaxNeighbours) ends_[data.guid()] = e;
   }

@@ -242,6 +242,7 @@ class InprocNode final : public Node {
   }
   std::vector<Endpoint> endpoints() override { return space_->endpoints(); }
   std::uint64_t incompatible() const override { return 0; }
+  std::string complaint() const override { return {}; }
   bool wait(std::chrono::steady_clock::time_point deadline) override { return notifier_.wait(deadline); }
   void wake() noexcept override { notifier_.notify(); }
   const NodeOptions& options() const override { return options_; }

@@ -128,27 +128,87 @@ const char* policy_name(int id) {
 
 namespace {
 
-std::string qos_of(bool reliable, bool latched, bool exclusive) {
-  return std::string(reliable ? "reliable, " : "best-effort, ") + (latched ? "transient-local" : "volatile") +
-         (exclusive ? ", exclusive" : "");
+enum Policy { kDurability = 2, kDeadline = 4, kOwnership = 6, kLiveliness = 8, kReliability = 11 };
+
+std::string text(std::chrono::microseconds t, const char* none) {
+  if (t.count() == 0) return none;
+  const auto us = t.count();
+  return us % 1000 == 0 ? std::to_string(us / 1000) + " ms" : std::to_string(us) + " us";
+}
+
+/// What an end has of a policy.
+std::string value(int policy, const Endpoint& e) {
+  const std::string reliability = e.reliable ? "reliable" : "best-effort";
+  const std::string durability = e.latched ? "transient-local" : "volatile";
+  switch (policy) {
+    case kDurability:
+      return durability;
+    case kDeadline:
+      return text(e.deadline, "no deadline");
+    case kOwnership:
+      return e.exclusive ? "exclusive" : "shared";
+    case kLiveliness:
+      return text(e.liveliness, "no lease");
+    case kReliability:
+      return reliability;
+    default:
+      return reliability + ", " + durability;
+  }
+}
+
+/// Where both ends are known, whether the writer offers less than the reader asks for.
+bool differ(int policy, const Endpoint& writer, const Endpoint& reader) {
+  const auto later = [](std::chrono::microseconds offered, std::chrono::microseconds asked) {
+    return asked.count() > 0 && (offered.count() == 0 || offered > asked);
+  };
+  switch (policy) {
+    case kDurability:
+      return reader.latched && !writer.latched;
+    case kDeadline:
+      return later(writer.deadline, reader.deadline);
+    case kOwnership:
+      return reader.exclusive != writer.exclusive;
+    case kLiveliness:
+      return later(writer.liveliness, reader.liveliness);
+    case kReliability:
+      return reader.reliable && !writer.reliable;
+    default:
+      return false;
+  }
+}
+
+Endpoint our_end(const Disagreement& d) {
+  Endpoint e{.writes = d.we_write, .reliable = true, .latched = d.topic->delivery == Delivery::latched};
+  const auto more = d.we_write ? std::chrono::milliseconds(0) : kRounding;
+  if (!d.we_write && d.ask == Ask::data) return e;
+  if (d.topic->rate_hz > 0) e.deadline = d.topic->stale + more;
+  e.liveliness = kAlive + more;
+  return e;
 }
 
 }  // namespace
 
-std::string incompatible_sentence(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known) {
-  const bool latched = d.topic->delivery == Delivery::latched;
-  std::string theirs = d.we_write ? "a peer's reader asks for more" : "a peer's writer offers less";
+void Complaints::tell(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known,
+                      const std::function<void(const std::string&)>& log) {
+  const Endpoint ours = our_end(d);
+  const auto say = [&](const WriterId& peer, const std::string& theirs) {
+    if (told_.size() >= kMost || !told_.emplace(d.topic->name, d.we_write, d.policy, peer).second) return;
+    last_ = "topic " + std::string(d.topic->name) + " (" + to_string(vendor) + "): QoS " +
+            policy_name(d.policy) +
+            " does not match: " + (d.we_write ? "our writer offers " : "our reader asks for ") +
+            value(d.policy, ours) + ", " + theirs + "; no data flows between the two";
+    if (log) log(last_);
+  };
+  bool named = false;
   for (const Endpoint& e : known) {
-    const bool same = e.reliable && e.latched == latched && !e.exclusive;
-    if (e.topic != d.topic->name || e.writes == d.we_write || same) continue;
-    theirs = std::string(d.we_write ? "the reader" : "the writer") + " of " +
-             (e.participant.empty() ? "an unnamed participant" : e.participant) +
-             (d.we_write ? " asks for " : " offers ") + qos_of(e.reliable, e.latched, e.exclusive);
+    if (e.topic != d.topic->name || e.writes == d.we_write) continue;
+    if (!differ(d.policy, d.we_write ? ours : e, d.we_write ? e : ours)) continue;
+    named = true;
+    say(e.id, std::string(d.we_write ? "the reader of " : "the writer of ") +
+                  (e.participant.empty() ? "an unnamed participant" : e.participant) +
+                  (d.we_write ? " asks for " : " offers ") + value(d.policy, e));
   }
-  return "topic " + std::string(d.topic->name) + " (" + to_string(vendor) + "): QoS " +
-         policy_name(d.policy) +
-         " does not match: " + (d.we_write ? "our writer offers " : "our reader asks for ") +
-         qos_of(true, latched, false) + ", " + theirs + "; no data flows between the two";
+  if (!named) say({}, d.we_write ? "a peer's reader asks for more" : "a peer's writer offers less");
 }
 
 Result<Identity, Problem> find_identity(const std::string& folder) {

@@ -1,7 +1,9 @@
 #pragma once
 /// What both vendors need to know about this host's network before they start.  Private to common/bus.
 
+#include <set>
 #include <string>
+#include <tuple>
 
 #include "common/bus/bus.h"
 
@@ -55,11 +57,25 @@ inline constexpr std::chrono::milliseconds kRounding{1};
 struct Disagreement {
   const Topic* topic = nullptr;
   bool we_write = false;
+  Ask ask = Ask::data;
   int policy = 0;
+  bool operator==(const Disagreement&) const = default;
 };
 
-/// One sentence for a user: which topic, which policy, both sides.  `known`: where the peer is looked up.
-std::string incompatible_sentence(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known);
+/// Who cannot agree with us, told to a user once for each peer, topic and policy.
+class Complaints {
+ public:
+  /// One sentence for each peer among `known` that was not named before: which topic and policy, what it is
+  /// on both sides, and whose.  Where nobody is known to differ: that a peer does.
+  void tell(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known,
+            const std::function<void(const std::string&)>& log);
+  const std::string& last() const { return last_; }
+
+ private:
+  static constexpr std::size_t kMost = 256;
+  std::set<std::tuple<std::string_view, bool, int, WriterId>> told_;
+  std::string last_;
+};
 
 /// What is wrong with a folder of an identity, or its files by the names of deploy/security/make.
 struct Identity {

@@ -1,5 +1,7 @@
 #include "common/runtime/presence.h"
 
+#include <algorithm>
+
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
 
@@ -7,6 +9,7 @@ namespace hamel::runtime {
 
 namespace {
 constexpr std::size_t kMostPeers = 256;
+constexpr std::size_t kLongest = 255;  // of a detail, on the wire
 }  // namespace
 
 Presence::Presence(bus::Node& node, wire::ServiceKind kind, std::uint32_t arm)
@@ -30,9 +33,11 @@ void Presence::hear() {
     known_[from] = said;
     if (s.idl_hash != status_.idl_hash || s.version != status_.version) {
       strangers_ += s.idl_hash != status_.idl_hash;
-      spdlog::warn("{} of arm {} is {} with IDL {}; this is {} with IDL {}: {}", wire::to_string(s.kind),
-                   s.arm, s.version, s.idl_hash, status_.version, status_.idl_hash,
-                   s.idl_hash != status_.idl_hash ? "they may not understand each other" : "same wire");
+      stranger_ =
+          fmt::format("{} of arm {} is {} with IDL {}; this is {} with IDL {}: {}", wire::to_string(s.kind),
+                      s.arm, s.version, s.idl_hash, status_.version, status_.idl_hash,
+                      s.idl_hash != status_.idl_hash ? "they may not understand each other" : "same wire");
+      spdlog::warn("{}", stranger_);
     }
     if (s.kind == status_.kind && s.arm == status_.arm) {
       ++doubles_;
@@ -50,6 +55,9 @@ void Presence::say(Clock::time_point now, Condition condition) {
                       : condition.state;
   status_.incarnation = condition.incarnation;
   status_.detail = std::move(condition.detail);
+  for (const std::string& word : {stranger_, node_.complaint()})
+    if (!word.empty()) status_.detail += "; " + word;
+  status_.detail.resize(std::min(status_.detail.size(), kLongest));
   status_.counters = std::move(condition.counters);
   status_.counters.push_back({"peers_of_other_idl", strangers_});
   status_.counters.push_back({"peers_of_same_name", doubles_});

@@ -19,7 +19,8 @@ struct Condition {
 };
 
 /// A peer of another version or IDL, and a second service of the same kind and arm, are named in one log line
-/// each and counted in our own status, which then is DEGRADED where the IDL differs.
+/// each and counted in our own status, which then is DEGRADED where the IDL differs.  The last word about a
+/// peer of another version or QoS stands in our status, too.
 class Presence {
  public:
   Presence(bus::Node& node, wire::ServiceKind kind, std::uint32_t arm);
@@ -39,6 +40,7 @@ class Presence {
   wire::Subscription<wire::ServiceStatus> in_;
   std::map<bus::WriterId, std::string> known_;  ///< the version each said last
   std::uint64_t strangers_ = 0, doubles_ = 0;
+  std::string stranger_;
   Clock::time_point last_{};
 };
 

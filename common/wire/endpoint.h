@@ -27,18 +27,24 @@ class Publisher {
 template <class T>
 class Subscription {
  public:
-  explicit Subscription(bus::Node& node) : reader_(node.reader(topic_of<T>())) {}
+  explicit Subscription(bus::Node& node) : node_(node), reader_(node.reader(topic_of<T>())) {}
 
-  /// The oldest waiting message that decodes; those that do not are counted and dropped.
+  /// The oldest waiting message that decodes; those that do not are counted and dropped.  False when none
+  /// waits, and after kRound messages in a row, good or bad, once: a flood must not keep the caller from what
+  /// is due.  The node's next wait() then returns at once.
   bool take(T& m) {
-    while (reader_->take(buffer_)) {
+    while (in_a_row_ < kRound && reader_->take(buffer_)) {
+      ++in_a_row_;
       const auto r = decode<T>(buffer_, m);
       if (r) return true;
       ++undecodable_;
       last_error_ = r.error();
     }
+    if (in_a_row_ == kRound) node_.wake();
+    in_a_row_ = 0;
     return false;
   }
+  static constexpr int kRound = 64;
 
   /// The writer of what take() gave last.
   bus::WriterId from() const { return reader_->from(); }
@@ -48,8 +54,10 @@ class Subscription {
   DecodeError last_error() const { return last_error_; }
 
  private:
+  bus::Node& node_;
   std::unique_ptr<bus::Reader> reader_;
   bus::Payload buffer_;
+  int in_a_row_ = 0;
   std::uint64_t undecodable_ = 0;
   DecodeError last_error_;
 };

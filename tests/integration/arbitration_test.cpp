@@ -69,7 +69,10 @@ TEST_F(Planners, ASlowStrongerOneTakesOverToo) {
 /// In real time: `drive` of `from`, until the arm is at `step`.
 class RealTime : public testing::Test {
  protected:
-  void poll() { arm->poll(now += 1ms); }
+  void poll() {
+    arm->poll(now += 1ms);
+    incarnation();
+  }
   std::uint64_t incarnation() {
     wire::ArmState state;
     while (states.take(state)) last = state;

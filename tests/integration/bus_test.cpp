@@ -4,6 +4,10 @@
 #include "common/bus/bus.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cstring>
@@ -45,8 +49,10 @@ std::uint32_t number_in(const Payload& p) {
 
 using Log = std::function<void(const std::string&)>;
 
-std::unique_ptr<bus::Node> open(Vendor vendor, std::uint32_t domain, Log log = {}) {
+std::unique_ptr<bus::Node> open(Vendor vendor, std::uint32_t domain, Log log = {},
+                                const std::string& name = "hamel") {
   bus::NodeOptions options;
+  options.name = name;
   options.vendor = vendor;
   options.domain = domain;
   options.log = std::move(log);
@@ -269,6 +275,65 @@ TEST_P(Bus, EveryMessageArrivesAsItWasSent) {
   there_and_equal(wire::RunSummary());
 }
 
+/// Good or broken, what comes in a flood is taken in rounds; nobody sleeps while a round is due.
+TEST_P(Bus, AFloodIsTakenInRounds) {
+  constexpr int kRound = wire::Subscription<wire::TorqueCommand>::kRound, kAll = 3 * kRound + 8;
+  const auto a = from(17), b = to(17);
+  const auto writer = a->writer(topics::kCommand);
+  wire::Subscription<wire::TorqueCommand> commands(*b);
+  const auto witness = b->reader(topics::kCommand);
+  ASSERT_TRUE(wait_for(
+      *b, [&] { return writer->matched() == 2 && commands.matched() == 1 && witness->matched() == 1; }));
+  Payload good, p;
+  ASSERT_TRUE(wire::encode(wire::TorqueCommand(), good));
+  for (int i = 0; i < kAll; ++i) ASSERT_TRUE(writer->write(i % 4 == 3 ? good : sample(0, 1)));
+  int came = 0;
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (witness->take(p)) ++came;
+    return came == kAll;
+  }));
+  const auto at_once = [&] { return b->wait(std::chrono::steady_clock::now()); };
+  at_once();
+  wire::TorqueCommand m;
+  int taken = 0;
+  for (int round = 1; round <= 3; ++round) {
+    while (commands.take(m)) ++taken;
+    EXPECT_EQ(taken, round * kRound / 4);
+    EXPECT_TRUE(at_once()) << "round " << round;
+  }
+  EXPECT_TRUE(wait_for(*b, [&] {
+    while (commands.take(m)) ++taken;
+    return taken == kAll / 4;
+  }));
+  EXPECT_EQ(commands.undecodable(), 3U * kAll / 4);
+}
+
+TEST_P(Bus, WhatMustBeRefusedIsPassedOverInRounds) {
+  if (GetParam().from == Vendor::inproc) return;  // its writers and readers are of one topic
+  Topic larger = topics::kMode;
+  larger.delivery = Delivery::stream;
+  const Topic stream = larger;
+  larger.max_bytes *= 2;
+  const auto a = from(18), b = to(18);
+  const auto writer = a->writer(larger);
+  const auto reader = b->reader(stream), witness = b->reader(larger);
+  ASSERT_TRUE(wait_for(
+      *b, [&] { return writer->matched() == 2 && reader->matched() == 1 && witness->matched() == 1; }));
+  for (std::uint32_t i = 0; i < 100; ++i) ASSERT_TRUE(writer->write(sample(1, i, larger.max_bytes)));
+  ASSERT_TRUE(writer->write(sample(1, 100)));
+  Payload p = sample(1, 0);
+  ASSERT_TRUE(wait_for(*b, [&] {
+    while (number_in(p) != 100 && witness->take(p)) {
+    }
+    return number_in(p) == 100;
+  }));
+  EXPECT_FALSE(reader->take(p));
+  EXPECT_TRUE(b->wait(std::chrono::steady_clock::now())) << "there is more";
+  EXPECT_TRUE(wait_for(*b, [&] { return reader->take(p); }));
+  EXPECT_EQ(p, sample(1, 100));
+  EXPECT_EQ(reader->counters().refused, 100U);
+}
+
 /// What a reader knows of its writers: who wrote, who took back, who lives.
 TEST_P(Bus, TellsWhoWrote) {
   const auto a = from(13), b = to(13);
@@ -407,6 +472,54 @@ TEST_P(Bus, DisagreementAboutQosIsCountedAndSaidOnce) {
   }
 }
 
+/// Each peer is named, with what the policy in question is on both sides.
+TEST_P(Bus, EveryPeerThatBreaksAPolicyIsNamedWithItsValues) {
+  if (GetParam().from == Vendor::inproc) return;
+  Topic slow = topics::kState;
+  slow.stale = 80ms;
+  std::string said;
+  int lines = 0;
+  const auto b = to(19, [&](const std::string& line) {
+    said = line;
+    ++lines;
+  });
+  const auto reader = b->reader(topics::kState, 0, bus::Ask::promises);
+  std::vector<std::unique_ptr<bus::Node>> nodes;
+  std::vector<std::unique_ptr<bus::Writer>> writers;
+  for (const std::string name : {"one", "two"}) {
+    nodes.push_back(open(GetParam().from, GetParam().domain + 19, {}, name));
+    writers.push_back(nodes.back()->writer(slow));
+    ASSERT_TRUE(wait_for(*b, [&] { return said.find("of " + name + " offers") != std::string::npos; }))
+        << said;
+    for (const char* part : {"hamel/v1/state", "deadline", "51 ms", "80 ms"})
+      EXPECT_NE(said.find(part), std::string::npos) << said;
+    EXPECT_EQ(b->complaint(), said);
+  }
+  EXPECT_EQ(lines, 2);
+  while (!writers.empty()) writers.pop_back();
+}
+
+/// A writer that leaves without a word: those that asked for it hear that it is silent.
+TEST_P(Bus, AWriterThatNoLongerSaysThatItLivesIsSilent) {
+  if (GetParam().from == Vendor::inproc) return;  // a writer within the process needs no watching
+  const auto b = to(15);
+  const auto reader = b->reader(topics::kGoal, 0, bus::Ask::promises), lenient = b->reader(topics::kGoal);
+  int status = 0;
+  const pid_t mute = fork();
+  if (mute == 0) {
+    execl("/proc/self/exe", "mute", to_string(GetParam().from),
+          std::to_string(GetParam().domain + 15).c_str(), nullptr);
+    _exit(1);
+  }
+  Payload p;
+  EXPECT_TRUE(wait_for(*b, [&] { return reader->take(p); }));
+  EXPECT_EQ(reader->counters().silent, 0U) << "it lives";
+  kill(mute, SIGSTOP);
+  EXPECT_TRUE(wait_for(*b, [&] { return reader->counters().silent > 0; })) << "nothing for a second";
+  kill(mute, SIGKILL);
+  waitpid(mute, &status, 0);
+}
+
 std::string name_of(const testing::TestParamInfo<Pair>& info) {
   return std::string(to_string(info.param.from)) + "_to_" + to_string(info.param.to);
 }
@@ -419,5 +532,22 @@ INSTANTIATE_TEST_SUITE_P(Vendors, Bus,
                                          Pair{Vendor::cyclonedds, Vendor::fastdds, 180}),
                          name_of);
 
+/// A writer of a process of its own, which says something once and then only that it lives.
+[[noreturn]] void stay(Vendor vendor, std::uint32_t domain) {
+  const auto node = open(vendor, domain);
+  const auto writer = node->writer(topics::kGoal);
+  writer->write(sample(1, 1));
+  while (true) node->wait(std::chrono::steady_clock::now() + kDeadline);
+}
+
 }  // namespace
 }  // namespace hamel
+
+int main(int argc, char** argv) {
+  if (argc == 3 && std::string_view(argv[0]) == "mute") {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    hamel::stay(hamel::bus::vendor_from(argv[1]).value(), static_cast<std::uint32_t>(std::atoi(argv[2])));
+  }
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

@@ -6,6 +6,7 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <set>
 
 #include "clients/hamel/bench_ping.h"
 
@@ -21,12 +22,19 @@ using namespace std::chrono_literals;
 
 constexpr auto kDeadline = 20s;
 
-Payload sample(std::uint32_t number, std::size_t size) {
+constexpr std::uint32_t kArm = 7, kStrangers = 1000, kManyKeys = 200;  // keys of a stranger: from 1000 on
+
+Payload sample(std::uint32_t number, std::size_t size, std::uint32_t key = kArm) {
   Payload p(size);
   p[1] = std::byte{1};
-  p[4] = std::byte{7};
+  std::memcpy(p.data() + 4, &key, 4);
   std::memcpy(p.data() + 8, &number, 4);
   return p;
+}
+std::uint32_t key_in(const Payload& p) {
+  std::uint32_t key;
+  std::memcpy(&key, p.data() + 4, 4);
+  return key;
 }
 
 /// The peer's whole life.
@@ -37,14 +45,27 @@ Payload sample(std::uint32_t number, std::size_t size) {
   Payload p;
   while (true) {
     node->wait(Clock::now() + 1s);
-    while (state->take(p)) command->write(p);
+    while (state->take(p))
+      if (key_in(p) < kStrangers) command->write(p);
     while (large->take(p)) {
     }
   }
 }
 
-auto peer(Vendor vendor, std::uint32_t domain) {
-  return [=] { execl("/proc/self/exe", "peer", to_string(vendor), std::to_string(domain).c_str(), nullptr); };
+/// The life of a stranger: 200 keys of its own on three topics, one each a millisecond.
+[[noreturn]] void crowd(Vendor vendor, std::uint32_t domain) {
+  const auto node = open(vendor, domain);
+  const std::unique_ptr<bus::Writer> writers[] = {
+      node->writer(topics::kState), node->writer(topics::kCommand), node->writer(topics::kObstacles)};
+  auto next = Clock::now();
+  for (std::uint32_t i = 0;; ++i) {
+    for (const auto& w : writers) w->write(sample(i, 400, kStrangers + i % kManyKeys));
+    for (next += 1ms; Clock::now() < next;) node->wait(next);
+  }
+}
+
+auto program(const char* role, Vendor vendor, std::uint32_t domain) {
+  return [=] { execl("/proc/self/exe", role, to_string(vendor), std::to_string(domain).c_str(), nullptr); };
 }
 
 struct Pair {
@@ -55,22 +76,25 @@ struct Pair {
 class Process : public testing::TestWithParam<Pair> {
  protected:
   /// Asks until the peer answers the very question.
-  bool answered(bus::Node& node, bus::Writer& writer, bus::Reader& reader) {
+  bool answered(bus::Node& node, bus::Writer& writer, bus::Reader& reader, std::uint32_t key = kArm) {
     const auto deadline = Clock::now() + kDeadline;
     Payload p;
     while (Clock::now() < deadline) {
-      const std::uint32_t asked = ++number_;
-      writer.write(sample(asked, 400));
+      const Payload asked = sample(++number_, 400, key);
+      writer.write(asked);
       const auto soon = Clock::now() + 5ms;
       while (Clock::now() < soon) {
-        while (reader.take(p))
-          if (p == sample(asked, 400)) return true;
+        while (reader.take(p)) {
+          keys_.insert(key_in(p));
+          if (p == asked) return true;
+        }
         node.wait(soon);
       }
     }
     return false;
   }
   std::uint32_t number_ = 0;
+  std::set<std::uint32_t> keys_;  ///< all that came
 };
 
 TEST_P(Process, StoppedOneBlocksNobodyAndIsBackWhenItContinues) {
@@ -78,7 +102,7 @@ TEST_P(Process, StoppedOneBlocksNobodyAndIsBackWhenItContinues) {
   const auto node = open(here, domain);
   const auto writer = node->writer(topics::kState), large = node->writer(topics::kObstacles);
   const auto reader = node->reader(topics::kCommand);
-  const Child other(peer(there, domain));
+  const Child other(program("peer", there, domain));
   ASSERT_TRUE(answered(*node, *writer, *reader));
   kill(other.pid(), SIGSTOP);
   auto longest = Clock::duration::zero();
@@ -99,7 +123,7 @@ TEST_P(Process, KilledOneIsMissedAndItsSuccessorFound) {
   const auto writer = node->writer(topics::kState);
   const auto reader = node->reader(topics::kCommand);
   for (int life = 0; life < 3; ++life) {
-    const Child other(peer(there, domain + 1));
+    const Child other(program("peer", there, domain + 1));
     ASSERT_TRUE(answered(*node, *writer, *reader)) << "life " << life;
   }
   const auto deadline = Clock::now() + kDeadline;
@@ -107,6 +131,27 @@ TEST_P(Process, KilledOneIsMissedAndItsSuccessorFound) {
     node->wait(Clock::now() + 20ms);
   EXPECT_EQ(writer->matched(), 0);
   EXPECT_EQ(reader->matched(), 0);
+}
+
+/// The keys that a reader keeps are bounded, and a key too many costs those that are known nothing.
+TEST_P(Process, AStrangerWithManyKeysSilencesNobody) {
+  const auto [here, there, domain] = GetParam();
+  const auto node = open(here, domain + 10);
+  const auto writer = node->writer(topics::kState);
+  const auto reader = node->reader(topics::kCommand);
+  const Child other(program("peer", there, domain + 10));
+  ASSERT_TRUE(answered(*node, *writer, *reader));
+  Child stranger(program("crowd", there, domain + 10));
+  const auto deadline = Clock::now() + kDeadline;
+  int questions = 0;
+  for (; questions < 500 || reader->counters().lost < kManyKeys / 4; ++questions) {
+    ASSERT_LT(Clock::now(), deadline) << questions << " answers, lost " << reader->counters().lost;
+    ASSERT_TRUE(answered(*node, *writer, *reader)) << "question " << questions;
+  }
+  EXPECT_GT(keys_.size(), 10U) << "the stranger was heard";
+  EXPECT_LE(keys_.size(), 64U);
+  stranger.end();
+  EXPECT_TRUE(answered(*node, *writer, *reader, 300)) << "an arm that comes when the stranger has gone";
 }
 
 INSTANTIATE_TEST_SUITE_P(Vendors, Process,
@@ -123,8 +168,11 @@ INSTANTIATE_TEST_SUITE_P(Vendors, Process,
 }  // namespace hamel
 
 int main(int argc, char** argv) {
-  if (argc == 3 && std::string_view(argv[0]) == "peer")
-    hamel::answer(hamel::bus::vendor_from(argv[1]).value(), static_cast<std::uint32_t>(std::atoi(argv[2])));
+  const std::string_view role = argv[0];
+  if (argc == 3 && (role == "peer" || role == "crowd")) {
+    const auto live = role == "peer" ? hamel::answer : hamel::crowd;
+    live(hamel::bus::vendor_from(argv[1]).value(), static_cast<std::uint32_t>(std::atoi(argv[2])));
+  }
   testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -23,6 +23,8 @@ class Doctor(unittest.TestCase):
         findings = {f["what"]: f for f in json.loads(out)["findings"]}
         for what in ("version", "interface lo", "fastdds on domain 83", "cyclonedds on domain 83", "domain 83", "clock", "--priority"):
             self.assertIn(what, findings)
+        for vendor in VENDORS:
+            self.assertRegex(findings[f"{vendor} version"]["text"], r"^\d+\.\d+\.\d+$")
         self.assertEqual(code, 0, out)
         code, out, err = hamel("doctor", "--interface", "nosuch0", "--domain", 83)
         self.assertEqual(code, 1, out)
