@@ -14,24 +14,25 @@
 namespace hamel::fuzz {
 
 /// Reads numbers from bytes; zeros follow when they run out.  Most numbers are ordinary, some are at the
-/// edge.
+/// edge unless calm.
 class Bytes {
  public:
   explicit Bytes(std::span<const std::uint8_t> data) : data_(data) {}
+  void calm(bool yes) { calm_ = yes; }
   bool done() const { return at_ >= data_.size(); }
   unsigned byte() { return done() ? 0u : data_[at_++]; }
   int upto(int n) { return static_cast<int>(byte() % static_cast<unsigned>(n + 1)); }
   /// In [-s, s], or with the chance 1/64 something hard.
   double number(double s) {
     const unsigned kind = byte();
-    if (kind < 4) return hard();
+    if (kind < 4 && !calm_) return hard();
     const unsigned bits = byte() << 8 | byte();
     return s * (static_cast<double>(bits) / 32767.5 - 1);
   }
   /// As number(), but > 0, and over `decades` below s.
   double positive(double s, double decades) {
     const unsigned kind = byte();
-    if (kind < 4) return hard();
+    if (kind < 4 && !calm_) return hard();
     return s * std::pow(10, -decades * byte() / 255);
   }
   double hard() {
@@ -67,25 +68,42 @@ class Bytes {
  private:
   std::span<const std::uint8_t> data_;
   std::size_t at_ = 0;
+  bool calm_ = false;
 };
 
+/// Puts a joint's motion into the plane z = 0 of the link before it.
+inline void flatten(model::Joint& joint, Bytes& in) {
+  const auto turn_z = [&] { return lie::exp_so3(Eigen::Vector3d(0, 0, in.number(3))); };
+  joint.X_PJ.R = turn_z();
+  const bool slides = joint.kind == model::JointKind::prismatic;
+  joint.axis = slides ? Eigen::Vector3d(turn_z().col(0)) : Eigen::Vector3d(0, 0, in.upto(1) == 0 ? -1 : 1);
+}
+
+/// Short with numbers at the edge, or long with none; some planar.
 inline model::ChainSpec spec(Bytes& in) {
   model::ChainSpec s;
+  const bool calm = in.upto(1) == 0, planar = in.upto(2) == 0;
+  in.calm(calm);
   s.gravity_W_mps2 = in.vec3(20);
-  const int n = 1 + in.upto(11);
+  const int n = 1 + in.upto(calm ? 39 : 11);
   for (int i = 0; i < n; ++i) {
     model::Joint joint;
     joint.kind = static_cast<model::JointKind>(in.upto(2));
     joint.X_PJ = {lie::exp_so3(in.vec3(3)), in.vec3(1)};
     joint.axis = in.vec3(1);
-    if (in.byte() > 3) joint.axis.normalize();
+    if (in.byte() > 3 || calm) joint.axis.normalize();
+    if (planar) flatten(joint, in);
     if (in.upto(3) == 0) joint.damping = in.positive(10, 6);
     if (in.upto(3) == 0) joint.armature = in.positive(1, 9);
     if (in.upto(3) == 0) joint.limits.lower = -in.positive(3, 3), joint.limits.upper = in.positive(3, 3);
+    if (in.upto(3) == 0) joint.limits.velocity = in.positive(10, 6);
+    if (in.upto(3) == 0) joint.limits.effort = in.positive(100, 6);
     model::Link link;
-    link.inertia.mass_kg = in.positive(100, 9);
+    link.inertia.mass_kg = in.positive(100, calm ? 3 : 9);
     link.inertia.com_m = in.vec3(0.5);
-    const Eigen::Array3d a = Eigen::Array3d(in.positive(1, 6), in.positive(1, 6), in.positive(1, 6)).square();
+    const double decades = calm ? 2 : 6;
+    const Eigen::Array3d a =
+        Eigen::Array3d(in.positive(1, decades), in.positive(1, decades), in.positive(1, decades)).square();
     const Eigen::Matrix3d R = lie::exp_so3(in.vec3(3));
     const Eigen::Vector3d moments(a[1] + a[2], a[0] + a[2], a[0] + a[1]);
     const Eigen::Matrix3d I = link.inertia.mass_kg * (R * moments.asDiagonal() * R.transpose());
@@ -93,6 +111,7 @@ inline model::ChainSpec spec(Bytes& in) {
     s.joints.push_back(joint);
     s.links.push_back(link);
   }
+  in.calm(false);
   return s;
 }
 
@@ -109,6 +128,7 @@ inline dynamics::Options options(Bytes& in) {
   o.max_iterations = in.upto(40);
   o.max_subdivisions = in.upto(7);
   if (in.upto(3) == 0) o.stop_stiffness = in.positive(1e4, 6);
+  o.space = static_cast<scene::Space>(in.upto(1));
   return o;
 }
 
@@ -118,13 +138,14 @@ inline bool same(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return a.size() == b.size();
 }
 
-/// Now and then a wrench, a payload that may be no body, a state of other sizes.
+/// Now and then a wrench that may be none, a payload that may be no body, a state of other sizes.
 inline std::string load(dynamics::Integrator& integrator, dynamics::State& s, Bytes& in) {
   const int n = integrator.chain().n();
   if (in.upto(2) == 0) {
     lie::Wrench F;
     F << in.vec3(5), in.vec3(20);
-    if (F.allFinite()) integrator.set_wrench(in.upto(n - 1), F);
+    if (integrator.set_wrench(in.upto(n - 1), F) != F.allFinite())
+      return "a wrench that is not finite was taken, or a finite one not";
   }
   if (in.upto(3) == 0) {
     model::Inertia body{in.positive(10, 4), in.vec3(0.3), Eigen::Matrix3d::Zero()};

@@ -34,7 +34,7 @@ class Loads : public test::ForSeed {
   VectorXd travel(Options options, int steps, double& made_up) {
     options.dt_s = 0.2 / steps;
     Integrator integrator(chain, options);
-    integrator.set_wrench(link, push);
+    EXPECT_TRUE(integrator.set_wrench(link, push));
     State s = integrator.start(q, qd);
     for (int k = 0; k < steps; ++k) {
       const StepReport r = integrator.step(s, tau);
@@ -55,7 +55,7 @@ TEST_P(Loads, AWrenchActsThroughTheJacobian) {
   rbd::frame_jacobian(chain, ws, link, ws.X_WB[static_cast<std::size_t>(link)].p, J);
   const VectorXd by_hand = tau + J.transpose() * push;
   Integrator a(chain, {.tier = Tier::rk4, .dt_s = 1e-7}), b(chain, {.tier = Tier::rk4, .dt_s = 1e-7});
-  a.set_wrench(link, push);
+  ASSERT_TRUE(a.set_wrench(link, push));
   State sa = a.start(q, qd), sb = b.start(q, qd);
   ASSERT_TRUE(a.step(sa, tau).usable() && b.step(sb, by_hand).usable());
   EXPECT_LT((sa.qd - sb.qd).norm(), 1e-11 * (1 + sb.qd.norm()));
@@ -204,7 +204,7 @@ TEST_P(Loads, WorkOfAllThatActsIsTheChangeOfEnergy) {
     State s = integrator.start(q, qd);
     model::Inertia body{0.3, Eigen::Vector3d(0.1, 0, 0.05), 0.01 * Eigen::Matrix3d::Identity()};
     ASSERT_TRUE(integrator.set_payload(body, s).empty());
-    integrator.set_wrench(link, push);
+    EXPECT_TRUE(integrator.set_wrench(link, push));
     const double E0 = integrator.energy(s);
     double work = 0, made_up = 0, effort = 0;
     for (int k = 0; k < 300; ++k) {
@@ -216,28 +216,6 @@ TEST_P(Loads, WorkOfAllThatActsIsTheChangeOfEnergy) {
     const double scale = 1 + effort + std::abs(E0);
     EXPECT_NEAR(integrator.energy(s) - E0, work + made_up, 1e-11 * scale);
     EXPECT_LT(std::abs(made_up), c.bound * scale) << test::name(c.options.tier);
-  }
-}
-
-// Where the steps are too long for the motion the ledger asks for shorter ones, or says no: energy does not
-// creep away.
-TEST(Ledger, KeepsFastRodsFromDrifting) {
-  const model::Chain chain = test::fast_rods();
-  const double scale = rbd::energy_scale(chain);
-  for (const double dt : {0.02, 0.03, 0.05}) {
-    Integrator integrator(chain, {.dt_s = dt});
-    State s = integrator.start(VectorXd::Zero(3), VectorXd::Zero(3));
-    const double E0 = integrator.energy(s);
-    bool said = false;
-    for (int k = 0; k * dt < 300; ++k) {
-      const StepReport r = integrator.step(s, VectorXd::Zero(3));
-      said |= !r.usable() || r.substeps > 1;
-      if (!r.usable()) break;  // said, not hidden
-      const double off = integrator.energy(s) - E0;
-      EXPECT_NEAR(r.made_up_J, off, 1e-9 * scale) << "every report tells the sum";
-      ASSERT_LT(std::abs(off), 0.6 * scale) << dt << " at " << k * dt;
-    }
-    EXPECT_TRUE(said) << dt;
   }
 }
 

@@ -26,7 +26,7 @@ struct Motion {
   VectorXd end(Options options, int steps) const {
     options.dt_s = time_s / steps, options.max_iterations = 200;
     Integrator integrator(chain, options);
-    integrator.set_wrench(chain.n() - 1, push);
+    EXPECT_TRUE(integrator.set_wrench(chain.n() - 1, push));
     State s = integrator.start(q, qd);
     VectorXd z = VectorXd::Constant(2 * q.size(), std::nan(""));
     for (int k = 0; k < steps; ++k) {

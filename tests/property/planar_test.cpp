@@ -30,7 +30,9 @@ class Planar : public test::ForSeed {
     ASSERT_EQ(flat.space(), Space::automatic);
     ASSERT_EQ(full.space(), Space::se3);
     State a = flat.start(q, qd), b = full.start(q, qd);
-    if (push) flat.set_wrench(n / 2, *push), full.set_wrench(n / 2, *push);
+    if (push) {
+      EXPECT_TRUE(flat.set_wrench(n / 2, *push) && full.set_wrench(n / 2, *push));
+    }
     EXPECT_NEAR(flat.energy(a), full.energy(b), 1e-12 * (1 + std::abs(full.energy(b))));
     double work = 0;
     for (int k = 0; k < 20; ++k) {

@@ -164,9 +164,11 @@ StepReport Integrator::step(State& state, const VectorXd& tau) noexcept { return
 
 const VectorXd& Integrator::torque_applied() const noexcept { return impl_->torque_applied(); }
 
-void Integrator::set_wrench(int link, const lie::Wrench& F_W) noexcept {
-  assert(link >= 0 && link < chain().n() && F_W.allFinite());
+bool Integrator::set_wrench(int link, const lie::Wrench& F_W) noexcept {
+  assert(link >= 0 && link < chain().n());
+  if (!F_W.allFinite()) return false;
   impl_->set_wrench(link, F_W);
+  return true;
 }
 void Integrator::clear_wrenches() noexcept { impl_->clear_wrenches(); }
 

@@ -70,8 +70,9 @@ class Integrator {
   const Eigen::VectorXd& torque_applied() const noexcept;
   /// From now on a wrench acts on link `link` at its frame's origin: torque [N m] and force [N] in world
   /// axes, constant until set anew.  It enters like joint torque (a tier keeps its order with it) and its
-  /// work is in the report.  Not part of State: who resumes sets it again.
-  void set_wrench(int link, const lie::Wrench& F_W) noexcept;
+  /// work is in the report.  Not part of State: who resumes sets it again.  False, and nothing changes,
+  /// where a number is not finite.
+  [[nodiscard]] bool set_wrench(int link, const lie::Wrench& F_W) noexcept;
   void clear_wrenches() noexcept;
   /// From now on the end effector holds a body, given in the end effector's axes; mass 0: none.  q and qd of
   /// `state` stay, its momentum becomes M qd of the laden arm.  Returns what is wrong with the body and
