@@ -128,7 +128,6 @@ TEST(Example52, DefaultMethodReachesInAllSetsAtTenMilliseconds) {
 // Kill and restart: wherever the run is cut and the arm stands still, a fresh planner finishes it.
 TEST(Example52, DefaultMethodStartsAgainFromRestAnywhereOnItsWay) {
   Example52 e = improved();
-  e.options.escapes = 0;  // on its own
   std::vector<Eigen::VectorXd> cuts;
   for (double t = 0.5; t < 8.5; t += 0.5)
     cuts.push_back(run(e.robot, e.obstacles, e.options, e.goal, e.q0, 1e-3, t).q);

@@ -67,8 +67,8 @@ TEST(UnknownVelocity, IsMadeOutFromTheTimesOfTheSightsAlone) {
 }
 
 // A sphere that flies at the first link, which hardly any joint can move out of its way, must not throw the
-// other links about: the operational inertia of such a point is nearly singular.  The powerless mapping of
-// the obstacle's own velocity would ask for 2,300 to 26,500 rad/s^2 here.
+// other links about: the operational inertia of such a point is nearly singular.  Weighed by all of it the
+// obstacle's own velocity would ask for 2,300 to 26,500 rad/s^2 here.
 TEST(MovingObstacle, AtTheShoulderDoesNotThrowTheArmAbout) {
   const scene::Robot robot = planar_arm(4, 1.0 / 12, 0.05);
   scene::PlannerOptions o;
@@ -84,11 +84,10 @@ TEST(MovingObstacle, AtTheShoulderDoesNotThrowTheArmAbout) {
     rbd::Workspace ws(robot.chain);
     Eigen::VectorXd qdd(4);
     rbd::forward_dynamics(robot.chain, q, qd, out.torque_Nm, ws, qdd);
-    EXPECT_LT(qdd.lpNorm<Eigen::Infinity>(), 200) << x;
+    EXPECT_LT(qdd.lpNorm<Eigen::Infinity>(), 300) << x;
   }
 }
 
-// Whatever the state: the command with the compensation of gravity stays within the joints' strength.
 TEST(MovingObstacle, GoesOnAheadOfACycleAsItDoesWithAge) {
   const scene::Robot robot = planar_arm(1, 1.0 / 12, 0.05);
   scene::PlannerOptions o;
@@ -114,6 +113,7 @@ TEST(MovingObstacle, GoesOnAheadOfACycleAsItDoesWithAge) {
   EXPECT_LT(ahead.items()[0].d, before_m - 0.06 - 0.1) << "it goes and it turns";
 }
 
+// Whatever the state: the command with the compensation of gravity stays within the joints' strength.
 TEST(TorqueLimits, HoldForTheSumWithGravity) {
   Random rng(4);
   for (int k = 0; k < 200; ++k) {

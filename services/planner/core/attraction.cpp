@@ -154,6 +154,13 @@ bool Attraction::beyond_limits(const Arm& arm, const scene::Goal& goal) noexcept
   return false;
 }
 
+void Attraction::clamp_to_limits(const Arm& arm, scene::Goal& goal) noexcept {
+  for (int j = 0; j < arm.n(); ++j) {
+    const model::JointLimits& limits = arm.chain.joint(j).limits;
+    goal.joints[j] = std::clamp(goal.joints[j], limits.lower, limits.upper);
+  }
+}
+
 int Attraction::blocked_joint(const Arm& arm) const noexcept {
   for (int j = 0; j < arm.n(); ++j)
     if (std::abs(qdd_[j]) > 1e-3 && room(arm.chain.joint(j).limits, arm.q[j], qdd_[j]) < kAtLimit) return j;

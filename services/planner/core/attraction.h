@@ -39,8 +39,9 @@ class Attraction {
   const Eigen::Vector3d& target_W() const noexcept { return X_WT_.p; }
   /// The same with the orientation that a pose goal asks for.
   const lie::Pose& target() const noexcept { return X_WT_; }
-  /// A joint target lies outside the joint limits.
+  /// A joint target lies outside the joint limits; the nearest one inside them.
   static bool beyond_limits(const Arm& arm, const scene::Goal& goal) noexcept;
+  static void clamp_to_limits(const Arm& arm, scene::Goal& goal) noexcept;
   /// The joint that the attraction presses against its limit, or -1.
   int blocked_joint(const Arm& arm) const noexcept;
 

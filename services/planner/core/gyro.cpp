@@ -92,6 +92,8 @@ void Gyro::add_paper(const Arm& arm, Pairs& pairs, VectorXd& tau) noexcept {
   tau += tau_gyro_;
 }
 
+// G collects the own velocities' share, tau_moving_ the obstacles'; both are of one w', so that the force
+// knows relative velocity alone and does no work on what moves with the obstacle.
 void Gyro::add_powerless(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& tau) noexcept {
   G_.setZero();
   tau_moving_.setZero();
@@ -101,14 +103,14 @@ void Gyro::add_powerless(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& ta
   for (std::size_t k = 0; k < items.size(); ++k) {
     Pair& pair = items[k];
     const Vector3d w = rotation(pair);
+    pair.gyroscopic.setZero();
     if (w.isZero(0)) continue;
     any = true;
-    const Vector3d mapped = joint_rotation(mapping_, pair.Lam, w);
-    pair.gyroscopic = mapped.cross(relative ? pair.v_relative : pair.v);
-    add_gyroscopic(mapped, pairs.J(k), G_);
+    const Vector3d turn = joint_rotation(mapping_, movable_inertia(pair.Lam, pair.B), w);
+    pair.gyroscopic = turn;  // until v_mid is known
+    add_gyroscopic(turn, pairs.J(k), G_);
     if (relative)
-      tau_moving_.noalias() -=
-          pairs.J(k).transpose().lazyProduct(Vector3d(pair.Lam * w.cross(pair.v_obstacle)));
+      tau_moving_.noalias() -= pairs.J(k).transpose().lazyProduct(Vector3d(turn.cross(pair.v_obstacle)));
   }
   if (!any) return;
   tau += tau_moving_;
@@ -121,7 +123,13 @@ void Gyro::add_powerless(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& ta
   tau_gyro_.noalias() = G_ * v_mid_;
   tau += tau_gyro_;
   gyroscopic_power_ += tau_gyro_.dot(v_mid_);
-  injected_power_ += tau_moving_.dot(arm.qd);
+  injected_power_ += tau_moving_.dot(v_mid_);
+  for (std::size_t k = 0; k < items.size(); ++k) {
+    Pair& pair = items[k];
+    if (pair.gyroscopic.isZero(0)) continue;
+    const Vector3d v = pairs.J(k).lazyProduct(v_mid_);
+    pair.gyroscopic = pair.gyroscopic.cross(relative ? Vector3d(v - pair.v_obstacle) : v);
+  }
 }
 
 bool Gyro::add_circulation(Pairs& pairs, Memory& memory, double t_s, double kc, const VectorXd& qdd_att,

@@ -20,12 +20,12 @@ class Gyro {
   /// @param qdd_att  M^-1 tau_att: where the attraction wants the points to go
   void choose_axes(Pairs& pairs, const Memory& memory, double t_s, const Eigen::VectorXd& qdd_att) noexcept;
 
-  /// tau += the gyroscopic torque.
+  /// tau += the gyroscopic torque, and each pair's `gyroscopic` is the force [N] it was made of.
   ///   paper:             J^T Lam (w x v), Eq. (21)
-  ///   force, symmetric:  G (qd + dqd/2) - sum J^T (w' x v_o), with the skew G = sum J^T hat(w') J and dqd
+  ///   force, symmetric:  sum J^T (w' x (J (qd + dqd/2) - v_o)), with G = sum J^T hat(w') J, skew, and dqd
   ///   from
   ///                      (M - dt/2 G) dqd = dt (tau - c + G qd - sum J^T (w' x v_o)): powerless over the
-  ///                      step
+  ///                      step for who moves with the obstacle
   void add(const Arm& arm, Pairs& pairs, double dt_s, Eigen::VectorXd& tau) noexcept;
 
   /// tau += J^T Lam (kc S(1 - d/rho0) press e_c x n), press = max(0, n . J qdd_att): slides along what it

@@ -16,6 +16,11 @@ Matrix3d operational_inertia(const scene::PlannerOptions& o, const Matrix3d& B) 
   return 0.5 * (Lam + Lam.transpose());
 }
 
+Matrix3d movable_inertia(const Matrix3d& Lam, const Matrix3d& B) noexcept {
+  const Matrix3d moved = Lam * B * Lam;
+  return 0.5 * (moved + moved.transpose());
+}
+
 Vector3d joint_rotation(scene::Mapping mapping, const Matrix3d& Lam, const Vector3d& w) noexcept {
   if (mapping == scene::Mapping::force) return w;
   return 0.5 * (Lam.trace() * w - Lam * w);

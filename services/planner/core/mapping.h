@@ -11,6 +11,10 @@ namespace hamel::planner {
 /// trace(B).
 Eigen::Matrix3d operational_inertia(const scene::PlannerOptions& o, const Eigen::Matrix3d& B) noexcept;
 
+/// Lam B Lam: like Lam where joints move the point, and nothing where none does and Lam grows to 1/lam2. What
+/// symmetric weighs by: it mixes both directions, and an obstacle's velocity has a part that no joint makes.
+Eigen::Matrix3d movable_inertia(const Eigen::Matrix3d& Lam, const Eigen::Matrix3d& B) noexcept;
+
 /// w' with torque J^T (w' x v):  force: w;  symmetric: (tr(Lam) w - Lam w)/2, so that hat(w') is the
 /// symmetrised (Lam hat(w) + hat(w) Lam)/2: weighted by inertia like Eq. (21), and powerless, which (21) is
 /// not.

@@ -16,10 +16,14 @@ void restart_clocks(Memory& m, const Progress& now) {
   m.flips = 0;
 }
 
-Verdict stuck(const Progress& now, bool moving) {
+// What of the arm holds it up is said once and kept: an arm that hardly moves would change it all the time.
+Verdict stuck(const Progress& now, bool moving, Reason held = Reason::none) {
   if (now.target_blocked) return {State::stuck, Reason::goal_blocked, "an obstacle lies over the target"};
-  if (now.at_joint_limit) return {State::stuck, Reason::joint_limit, "a joint at its limit is in the way"};
-  if (moving) return {State::stuck, Reason::orbit, "the arm moves without coming nearer"};
+  const bool keeps = held == Reason::joint_limit || held == Reason::orbit || held == Reason::local_minimum;
+  if (keeps ? held == Reason::joint_limit : now.at_joint_limit)
+    return {State::stuck, Reason::joint_limit, "a joint at its limit is in the way"};
+  if (keeps ? held == Reason::orbit : moving)
+    return {State::stuck, Reason::orbit, "the arm moves without coming nearer"};
   return {State::stuck, Reason::local_minimum, "attraction and obstacles hold each other"};
 }
 
@@ -72,7 +76,7 @@ Verdict judge(const scene::PlannerOptions& o, Memory& m, const Progress& now) no
   const bool stands = now.t_s - m.fast_s >= kSlowFor_s;
   if (before == State::stuck && !progress) {
     const Reason reason = static_cast<Reason>(m.reason);
-    if (reason != Reason::unreachable) return stuck(now, !stands);
+    if (reason != Reason::unreachable) return stuck(now, !stands, reason);
   }
   if (idle_s >= o.progress_window_s && stands && !now.escaping) return stuck(now, false);
   const double windows = now.has_rollouts ? 1 : kOrbitWindows;

@@ -311,8 +311,8 @@ void Pairs::complete(const Arm& arm) noexcept {
     pair.v_obstacle = o.V_WO.tail<3>() + o.V_WO.head<3>().cross(pair.at.on_obstacle - o.X_WO.p);
     pair.v_relative = pair.v - pair.v_obstacle;
     MJ_.noalias() = arm.M_inverse.lazyProduct(J_k.transpose());
-    const Eigen::Matrix3d B = J_k.lazyProduct(MJ_);
-    pair.Lam = operational_inertia(options_, B);
+    pair.B = J_k.lazyProduct(MJ_);
+    pair.Lam = operational_inertia(options_, pair.B);
   }
   for (std::size_t k = count_; k < count_ + self_count_; ++k) complete_self(arm, k);
 }

@@ -31,7 +31,8 @@ struct Pair {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();   ///< of the link at its witness point
   Eigen::Vector3d v_obstacle = Eigen::Vector3d::Zero();  ///< of the obstacle at its own
   Eigen::Vector3d v_relative = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d Lam = Eigen::Matrix3d::Zero();  ///< operational inertia at the witness point
+  Eigen::Matrix3d B = Eigen::Matrix3d::Zero();    ///< J M^-1 J^T at the witness point
+  Eigen::Matrix3d Lam = Eigen::Matrix3d::Zero();  ///< operational inertia there
   Eigen::Vector3d gyroscopic = Eigen::Vector3d::Zero(),
                   repulsive = Eigen::Vector3d::Zero();  ///< [N], for the report
   double multiplier = 0;                                ///< of the barrier [N]

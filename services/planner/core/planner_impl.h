@@ -15,6 +15,7 @@
 namespace hamel::planner {
 
 inline constexpr double kLeastPeriod_s = 1e-6;  ///< of a command
+inline constexpr std::uint64_t kFlips = 2;  ///< sides tried before an arm that circulates is called stuck
 
 struct Planner::Impl {
   Impl(const scene::Robot& robot, const Options& o, const Savings& savings)
@@ -52,6 +53,7 @@ struct Planner::Impl {
   bool approaching() const noexcept {
     return !goal_reachable && options.unreachable == scene::Unreachable::approach;
   }
+  bool near_enough() const noexcept;
   bool target_blocked(bool for_good) const noexcept;
   void remember_tip() noexcept;
   bool pass_waypoint(const Input& in) noexcept;

@@ -14,8 +14,9 @@ using scene::Method;
 
 namespace {
 
-constexpr std::uint64_t kFlips = 2;  // sides tried before an arm that circulates is called stuck
-constexpr double kLag_s = 1;         // without progress for so long an arm that moves asks for a quicker way
+constexpr double kLag_s = 1;  // without progress for so long an arm that moves asks for a quicker way
+constexpr double kNearEnough =
+    10;  // tolerances from the place nearest to a target out of reach: no more detours
 constexpr double kNearWaypoint = 0.15, kWaypoint_s = 4;  // a waypoint is passed [rad or m], or given up
 
 }  // namespace
@@ -24,10 +25,12 @@ constexpr double kNearWaypoint = 0.15, kWaypoint_s = 4;  // a waypoint is passed
 void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
   const bool same = wanted.id == memory.goal_id && wanted.kind == sought.kind &&
                     wanted.X_WG.p == sought.X_WG.p && wanted.X_WG.R == sought.X_WG.R;
+  const bool approaches = options.unreachable == scene::Unreachable::approach;
   if (!goal_fits || wanted.kind == scene::GoalKind::joints) {
-    if (goal_fits) pairs.set_goal(arm.chain, wanted.joints);
-    goal_reachable = true;
+    goal_reachable = !goal_fits || !Attraction::beyond_limits(arm, wanted);
     beyond_W.setZero();
+    if (!goal_reachable && approaches) Attraction::clamp_to_limits(arm, goal);
+    if (goal_fits) pairs.set_goal(arm.chain, goal.joints);
   } else if (!same || !looked) {
     const bool moved = looked && wanted.id == memory.goal_id && wanted.kind == sought.kind;
     const Reachability found = reachability(arm.chain, wanted, options, moved ? &arm.q : nullptr);
@@ -36,7 +39,7 @@ void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
     looked = true;
   }
   sought = wanted;
-  if (!goal_reachable && options.unreachable == scene::Unreachable::approach) goal.X_WG.p -= beyond_W;
+  if (!goal_reachable && approaches) goal.X_WG.p -= beyond_W;
 }
 
 // The command of a cycle in which nothing is unsafe, and how the goal stands.
@@ -49,18 +52,18 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
     if (!memory.goal_started) start_goal(memory, in.t_s);
     attraction.update(arm, goal, in.t_s - memory.goal_start_s, slow_down(in));
     goal_error = attraction.error();
+    const bool joints = goal.kind == scene::GoalKind::joints;
+    if (joints) goal_error.position_m = (sought.joints - arm.q).lpNorm<Eigen::Infinity>();
     target_W = attraction.target_W();
     Progress now;
     now.t_s = in.t_s;
     now.scaled_error = attraction.error().scaled;
-    const bool joints = goal.kind == scene::GoalKind::joints;
     now.speed = joints ? arm.qd.lpNorm<Eigen::Infinity>() : tip_speed;
     now.out_of_reach =
-        joints ? attraction.beyond_limits(arm, goal)
-               : (!goal_reachable && !approaching()) ||
-                     (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m;
+        (!goal_reachable && !approaching()) ||
+        (!joints && (attraction.target_W() - arm.shoulder_W).norm() > arm.reach_m + options.goal_tolerance_m);
     now.target_blocked = target_is_blocked = target_blocked(false);
-    const bool rejects = options.method == Method::gyro && options.unreachable == scene::Unreachable::reject;
+    const bool rejects = options.unreachable == scene::Unreachable::reject;
     refused =
         now.target_blocked && rejects && !now.out_of_reach && goal.V_WG.isZero(0) && target_blocked(true);
     now.at_joint_limit = attraction.blocked_joint(arm) >= 0;
@@ -85,6 +88,10 @@ Verdict Planner::Impl::move(const Input& in, VectorXd& tau) noexcept {
     return {State::unsafe, Reason::infeasible, "no acceleration keeps all distances: braking"};
   }
   return verdict;
+}
+
+bool Planner::Impl::near_enough() const noexcept {
+  return approaching() && memory.goal_started && memory.best_error <= kNearEnough;
 }
 
 // The place nearest to a target out of reach is no goal: who is there is stuck.
@@ -118,7 +125,7 @@ bool Planner::Impl::ask_for_escape(const Input& in, const Verdict& verdict) noex
                        verdict.reason == Reason::orbit;
   const bool lags = verdict.state == State::moving && !w.set && !target_is_blocked &&
                     in.t_s - std::max(memory.progress_s, w.asked_s) >= kLag_s;
-  const bool ask = options.method == Method::gyro && (curable || lags) && !w.waiting &&
+  const bool ask = options.method == Method::gyro && (curable || lags) && !near_enough() && !w.waiting &&
                    w.asked < static_cast<std::uint64_t>(options.escapes) &&
                    arm.n() <= static_cast<int>(kMaxWaypoint);
   if (!ask) return false;
@@ -140,7 +147,7 @@ double Planner::Impl::slow_down(const Input& in) const noexcept {
 // good: it stands, and no place within the tolerance has room either.
 bool Planner::Impl::target_blocked(bool for_good) const noexcept {
   const bool joints = goal.kind == scene::GoalKind::joints, turns = goal.kind != scene::GoalKind::pose;
-  const double dmin = options.barrier_gain > 0 ? options.dmin_m : 0;
+  const double dmin = options.method == Method::gyro && options.barrier_gain > 0 ? options.dmin_m : 0;
   const double slack = for_good ? options.goal_tolerance_m : 0;
   const auto items = obstacles.items();
   return std::any_of(items.begin(), items.end(), [&](const Obstacles::Item& item) {

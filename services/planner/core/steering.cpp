@@ -81,7 +81,7 @@ void Planner::Impl::circulate(const Input& in, VectorXd& tau) noexcept {
   const double t_s = in.t_s;
   if (!(options.kc > 0) || !has_goal) return;
   const double fade = std::clamp((t_s - memory.infeasible_s) / kFade_s, 0.0, 1.0);
-  const double kc = fade * open_tank(in.dt_s) * options.kc;
+  const double kc = near_enough() ? 0 : fade * open_tank(in.dt_s) * options.kc;
   const bool pressed = gyro.add_circulation(pairs, memory, t_s, kc, qdd_att, tau);
   memory.tank_J -= std::max(gyro.circulation_power_W(), 0.0) * in.dt_s;
   const double error = attraction.error().scaled;
@@ -96,7 +96,7 @@ void Planner::Impl::circulate(const Input& in, VectorXd& tau) noexcept {
     ++memory.flips;
     memory.turn_error = error;
     memory.turn_s = t_s;
-    memory.progress_s = t_s;  // the other side gets its own window
+    if (memory.flips < kFlips) memory.progress_s = t_s;  // the other side gets its own window
   }
 }
 
