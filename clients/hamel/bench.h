@@ -20,15 +20,19 @@ struct BenchArgs {
   std::uint64_t seed = 1;
   std::string model = "prototype";
   double dt_s = 0.002;
+  double duration_s = 0;  ///< of a trial, at most; 0: the family's own
   bool velocities_unknown = false;
-  double latency_s = 0;
-  int jobs = 0;  ///< threads; 0: one a processor
+  double latency_s = 0, rate_hz = 0;
+  bool dropout = false;  ///< the obstacle stream ends while the arm moves
+  int best_of = 1;       ///< trials of a scene, the first that reaches counts
+  int jobs = 0;          ///< threads; 0: one a processor
   std::vector<std::string> overrides;
   std::string csv_path, plot_path;
-  bool json = false;
+  bool json = false, check = false;
 };
 
-/// 0; 2 bad input; 130 interrupted, with what was done printed.
+/// 0; 1 with `check` where something promised is missed; 2 bad input; 130 interrupted, with what was done
+/// printed.
 int bench_planner(const BenchArgs& args);
 
 /// The verb `bench` with its options.
@@ -39,6 +43,8 @@ class BenchVerb {
   std::optional<int> run() const;
 
  private:
+  void add_scenes();
+  void add_conditions();
   BenchArgs args_;
   BenchReduceArgs reduce_args_;
   CLI::App *planner_ = nullptr, *reduce_ = nullptr;

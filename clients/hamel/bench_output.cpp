@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -42,6 +43,12 @@ json to_json(const std::string& method, const Tally& t) {
   return out;
 }
 
+std::string columns(const std::optional<Dropout>& d) {
+  return d ? fmt::format("{},{},{},{},{:d}", d->speed_radps, d->stale_speed_radps, d->stop_s, d->least_s,
+                         d->told)
+           : ",,,,";
+}
+
 }  // namespace
 
 std::string label(const Cell& cell) {
@@ -80,6 +87,36 @@ void print_table(const std::vector<CellTally>& all) {
       "median total variation of qdd [rad/s^2 a second].\n");
 }
 
+void print_dropouts(const std::vector<CellTally>& all) {
+  constexpr double within_s = 0.1;
+  fmt::print("\n{:<36}{:<11}{:>8}{:>10}{:>10}{:>12}{:>12}{:>12}{:>10}\n", "cell", "method", "moving",
+             "contacts", "UNSAFE %", "in 0.1 s %", "longest ms", "least ms", "rad/s");
+  for (const CellTally& c : all)
+    for (std::size_t k = 0; k < c.methods.size(); ++k) {
+      double moving = 0, told = 0, in_time = 0, fastest = 0;
+      std::uint64_t contacts = 0;
+      Dropout longest;
+      for (const Figures& f : c.tallies[k].all()) {
+        contacts += f.ending == Ending::collided;
+        if (!f.dropout || f.dropout->speed_radps < kStill_radps || f.ending != Ending::timed_out) continue;
+        const Dropout& d = *f.dropout;
+        ++moving;
+        told += d.told;
+        in_time += d.stop_s <= within_s;
+        if (d.stop_s > longest.stop_s) longest = d;
+        fastest = std::max(fastest, d.stale_speed_radps);
+      }
+      fmt::print("{:<36}{:<11}{:>8.0f}{:>10}{:>10.1f}{:>12.1f}{:>12.0f}{:>12.0f}{:>10.2f}\n", label(c.cell),
+                 c.methods[k], moving, contacts, 100 * told / moving, 100 * in_time / moving,
+                 1e3 * longest.stop_s, 1e3 * longest.least_s, fastest);
+    }
+  fmt::print(
+      "\nMoving: arms faster than 0.02 rad/s when the stream ended.  UNSAFE: told so, stale_obstacles, in "
+      "every cycle from then on that it was stale.\nIn 0.1 s: every joint slower than 0.02 rad/s so soon "
+      "after it was stale, and for good.  Least: what the torque limits allow at best in that\nlongest "
+      "case.  rad/s: the fastest joint when it was stale.\n");
+}
+
 void say_interrupted(const char* things) {
   fmt::print(stderr, "interrupted: these are the {} that were done\n", things);
 }
@@ -102,15 +139,17 @@ std::optional<Problem> write_csv(const std::string& path, const std::vector<Cell
   std::ofstream out(path);
   out << "family,spheres,variant,scene,method,ending,end_s,time_s,path_m,clearance_min_m,error_m,contact_by_"
          "arm,"
-         "contact_self,contact_reported,reason,cycles,infeasible_cycles,saturated_steps,qdd_variation\n";
+         "contact_self,contact_reported,reason,cycles,infeasible_cycles,saturated_steps,qdd_variation,"
+         "dropout_speed_radps,stale_speed_radps,stop_"
+         "s,stop_least_s,told\n";
   for (const CellTally& c : all)
     for (std::size_t k = 0; k < c.methods.size(); ++k)
       for (const Figures& f : c.tallies[k].all())
-        out << fmt::format("{},{},\"{}\",{},{},{},{},{},{},{},{},{:d},{:d},{:d},{},{},{},{},{}\n",
+        out << fmt::format("{},{},\"{}\",{},{},{},{},{},{},{},{},{:d},{:d},{:d},{},{},{},{},{},{}\n",
                            c.cell.family, c.cell.spheres, c.cell.variant, f.scene, c.methods[k],
                            to_string(f.ending), f.end_s, f.time_s, f.path_m, f.clearance_m, f.error_m,
                            f.arm_caused, f.self, f.reported, planner::to_string(f.reason), f.cycles,
-                           f.infeasible_cycles, f.saturated_steps, f.jerkiness);
+                           f.infeasible_cycles, f.saturated_steps, f.jerkiness, columns(f.dropout));
   out.flush();
   if (!out) return Problem{path, "cannot be written"};
   return std::nullopt;

@@ -21,6 +21,8 @@ struct CellTally {
 /// "panda_static 16" or "example_5_2, damping 0.5, vmax 1".
 std::string label(const Cell& cell);
 void print_table(const std::vector<CellTally>& all);
+/// How arms stopped once the obstacle stream had ended, of those that moved then.
+void print_dropouts(const std::vector<CellTally>& all);
 void print_json(const std::vector<CellTally>& all, const std::string& settings, bool interrupted);
 /// To standard error, behind what was done until then.
 void say_interrupted(const char* things);

@@ -12,6 +12,7 @@
 #include "clients/hamel/batch.h"
 #include "clients/hamel/bench_families.h"
 #include "clients/hamel/bench_output.h"
+#include "clients/hamel/outputs.h"
 #include "clients/hamel/progress.h"
 #include "clients/hamel/trial.h"
 #include "common/files/scene_text.h"
@@ -171,6 +172,26 @@ void print_json(const std::vector<Recording>& recordings, const std::vector<std:
   fmt::print("{}\n", out.dump(1));
 }
 
+/// A line for each run.
+std::optional<Problem> write_rows(const std::string& path, const std::vector<Recording>& recordings,
+                                  const std::vector<std::string>& methods, const std::vector<Row>& rows) {
+  std::ofstream out(path);
+  out << "stream,method,end_s,glitches,goals_reached,goals_missed,contacts_by_arm,contacts_by_others,"
+         "contacts_"
+         "unreported_cycles,unsafe_cycles,cycles,clearance_min_m\n";
+  for (const Row& row : rows) {
+    const Trial& t = row.trial;
+    out << fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                       row.job.empty ? "" : recordings[row.job.recording].name, methods[row.job.method],
+                       t.end_s, row.job.empty ? 0 : recordings[row.job.recording].glitches, t.goals_reached,
+                       t.goals_missed, t.contacts_by_arm, t.contacts_by_others, t.unreported_contacts,
+                       t.unsafe_cycles, t.cycles, t.clearance_min_m);
+  }
+  out.flush();
+  if (!out) return Problem{path, "cannot be written"};
+  return std::nullopt;
+}
+
 }  // namespace
 
 int bench_streams(const BenchArgs& args, const std::function<bool()>& stop) {
@@ -188,6 +209,7 @@ int bench_streams(const BenchArgs& args, const std::function<bool()>& stop) {
     const Problems bad = files::set_planner(assignments(args.overrides, names[k]), options.back());
     found.insert(found.end(), bad.begin(), bad.end());
   }
+  if (const auto p = output_problem("--csv", args.csv_path, {})) found.push_back(*p);
   if (!found.empty()) return runtime::complain("hamel bench", found);
 
   std::vector<Job> jobs;
@@ -209,6 +231,7 @@ int bench_streams(const BenchArgs& args, const std::function<bool()>& stop) {
         TrialOptions o;
         o.perfect_perception = false;
         o.velocities_known = !args.velocities_unknown;
+        o.latency_s = args.latency_s;
         o.cycle = goals();
         o.stop = stop;
         return run_trial(s, o);
@@ -220,6 +243,9 @@ int bench_streams(const BenchArgs& args, const std::function<bool()>& stop) {
     print_json(recordings.value(), names, rows);
   else
     print_rows(recordings.value(), names, rows);
+  if (!args.csv_path.empty())
+    if (const auto p = write_rows(args.csv_path, recordings.value(), names, rows))
+      return runtime::complain("hamel bench", {*p});
   if (!stop()) return runtime::kDone;
   say_interrupted("runs");
   return runtime::kInterrupted;

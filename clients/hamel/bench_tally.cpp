@@ -54,7 +54,8 @@ void Tally::add(std::size_t scene, const Trial& t) {
                   .reason = t.reason,
                   .cycles = t.cycles,
                   .infeasible_cycles = t.infeasible_cycles,
-                  .saturated_steps = t.saturated_steps});
+                  .saturated_steps = t.saturated_steps,
+                  .dropout = t.dropout});
   cycle_.add(t.cycle);
 }
 

@@ -2,6 +2,7 @@
 /// Trials counted: rates with their confidence intervals, medians.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct Figures {
   bool arm_caused = false, self = false, reported = true;
   planner::Reason reason = planner::Reason::none;
   std::uint64_t cycles = 0, infeasible_cycles = 0, saturated_steps = 0;
+  std::optional<Dropout> dropout = {};
 };
 
 /// All trials of one method in one cell.

@@ -310,6 +310,12 @@ Judge::Judge(Judge&&) noexcept = default;
 double Judge::clearance(const Eigen::VectorXd& q, std::span<const Obstacle> obstacles) {
   double d = kInf;
   for (int link = -1; link < impl_->chain.n(); ++link) d = std::min(d, clearance_of_link(link, q, obstacles));
+  return d;
+}
+
+double Judge::self_clearance(const Eigen::VectorXd& q) {
+  impl_->place(q);
+  double d = kInf;
   for (const auto& p : impl_->self_pairs) {
     const auto &a = impl_->bodies[static_cast<std::size_t>(p.a)],
                &b = impl_->bodies[static_cast<std::size_t>(p.b)];

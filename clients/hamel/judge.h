@@ -43,9 +43,11 @@ class Judge {
   ~Judge();
   Judge(Judge&&) noexcept;
 
-  /// Smallest distance of the arm standing at q to the obstacles (and of its own pairs); <= 0: touches.
+  /// Smallest distance of the arm standing at q to the obstacles; <= 0: touches.
   double clearance(const Eigen::VectorXd& q, std::span<const geometry::Obstacle> obstacles);
-  /// The same for one link alone (-1: the base).
+  /// Smallest distance of the shapes that must not touch each other; +inf: there are none.
+  double self_clearance(const Eigen::VectorXd& q);
+  /// clearance() for one link alone (-1: the base).
   double clearance_of_link(int link, const Eigen::VectorXd& q, std::span<const geometry::Obstacle> obstacles);
 
   /// The run goes on to this state; the first call sets where it begins.  Obstacles are told apart by id and

@@ -73,16 +73,19 @@ class Senses {
   Senses(const perception::Source& source, const TrialOptions& options) : source_(source), options_(options) {
     seen_.reserve(source.most_obstacles());
   }
-  void look(double t_s) {
+  void look(double now_s) {
+    const double t_s = std::max(std::min(now_s, options_.dropout_s) - options_.latency_s, 0.0);
     if (options_.perfect_perception) {
-      age_s = std::min(options_.latency_s, t_s);
-      source_.at(t_s - age_s, seen_);
+      const double rate_hz = options_.rate_hz;
+      const double stamp_s = rate_hz > 0 ? std::floor(t_s * rate_hz + 1e-9) / rate_hz : t_s;
+      source_.at(stamp_s, seen_);
+      age_s = now_s - stamp_s;
     } else {
       while (next_s_ <= t_s + 1e-12) {
         if (source_.at(next_s_, seen_)) stamp_s_ = next_s_;
         next_s_ = source_.next_time(next_s_);
       }
-      age_s = source_.is_static() ? 0 : t_s - stamp_s_;
+      age_s = source_.is_static() ? 0 : now_s - stamp_s_;
     }
     if (!options_.velocities_known)
       for (geometry::Obstacle& o : seen_) o.velocity_known = false;
@@ -150,6 +153,7 @@ class Run {
     const Contact* c = judge_.advance(t_s, arm_.state().q, truth_);
     const bool arrived = arrival_.update(t_s, arm_.state().q, arm_.state().qd);
     if (!options_.cycle.empty()) return count(c, arrived), false;
+    if (t_s >= options_.dropout_s && !c) return over_ = watch_stop(t_s);
     if (c) {
       trial_.contact = *c;
       trial_.ending = Ending::collided;
@@ -160,6 +164,41 @@ class Run {
       trial_.time_s = arrival_.since_s;
     }
     return over_ = c || arrived;
+  }
+
+  // How the arm stops once nothing is told any more.  True when it has been watched for long enough.
+  bool watch_stop(double t_s) {
+    const double speed = arm_.state().qd.lpNorm<Eigen::Infinity>();
+    if (!trial_.dropout) trial_.dropout = Dropout{.speed_radps = speed};
+    Dropout& d = *trial_.dropout;
+    if (!(senses_.age_s > scene_.planner.stale_brake_s)) {
+      stale_s_ = t_s;
+      d.stale_speed_radps = speed;
+      d.least_s = least_stop_s();
+    } else if (speed >= kStill_radps) {
+      d.stop_s = t_s + scene_.dynamics.dt_s - stale_s_;
+    }
+    trial_.ending = Ending::timed_out;
+    return t_s - options_.dropout_s > scene_.planner.stale_brake_s + kWatched_s;
+  }
+
+  // The joint that needs longest to lose its momentum by its own torque.
+  double least_stop_s() {
+    const model::Chain& chain = scene_.robot.chain;
+    const Eigen::VectorXd& q = arm_.state().q;
+    Eigen::MatrixXd M(chain.n(), chain.n());
+    rbd::Workspace ws(chain);
+    rbd::positions(chain, q, ws);
+    rbd::mass_matrix(chain, ws, M);
+    Eigen::VectorXd weight(chain.n());
+    rbd::gravity_torque(chain, ws, weight);
+    const Eigen::VectorXd p = M * arm_.state().qd, still = M.cwiseAbs().rowwise().sum() * kStill_radps;
+    double longest_s = 0;
+    for (int i = 0; i < chain.n(); ++i) {
+      const double room_Nm = chain.joint(i).limits.effort - std::abs(weight[i]);
+      longest_s = std::max(longest_s, (std::abs(p[i]) - still[i]) / std::max(room_Nm, 0.0));
+    }
+    return longest_s;
   }
 
   // Contacts and goals of a cycle.
@@ -195,6 +234,10 @@ class Run {
     planner_.plan(in, out_);
     if (options_.now_s) trial_.cycle.add(options_.now_s() - began_s);
     ++trial_.cycles;
+    if (trial_.dropout && senses_.age_s > scene_.planner.stale_brake_s)
+      trial_.dropout->told &= out_.report.reason == planner::Reason::stale_obstacles &&
+                              out_.report.state == planner::State::unsafe;
+    if (in.step == 0 && options_.by_way_of.size() > 0) planner_.take_escape(options_.by_way_of, t_s);
     trial_.unsafe_cycles += out_.report.state == planner::State::unsafe;
     trial_.unreported_contacts += touching_ && out_.report.reason != planner::Reason::contact;
     if (out_.report.escape_asked) {
@@ -226,6 +269,7 @@ class Run {
   Eigen::VectorXd qd_before_, qdd_before_, qdd_;
   Trial trial_;
   std::uint64_t goals_ = 0;
+  double stale_s_ = 0;  // the last time at which what was told was not yet stale
   bool over_ = false, touching_ = false;
 };
 

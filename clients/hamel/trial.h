@@ -33,16 +33,32 @@ class Durations {
 enum class Ending : std::uint8_t { reached, collided, stuck, timed_out, failed };
 const char* to_string(Ending v);
 
+inline constexpr double kWatched_s = 1, kStill_radps = 0.02;
+
 struct TrialOptions {
   /// Obstacles are known at every cycle as they are then; else only at the set times of perception.
   bool perfect_perception = true;
   bool velocities_known = true;
-  double latency_s = 0;  ///< what the planner is told is so old, and it is told so (perfect perception)
+  double rate_hz = 0;    ///< perfect perception: only so often, at whole multiples of the period; 0: always
+  double latency_s = 0;  ///< what the planner is told is at least so old, and it is told so
+  /// From then on nothing new is told of the obstacles.  The trial then ends, timed_out, kWatched_s after
+  /// what was told last has become stale, whether the goal is reached or not.
+  double dropout_s = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd by_way_of = {};  ///< a configuration to pass first; empty: none
   /// Not empty: one after the other for ever, each given up after 20 s; contacts are counted and do not end
   /// the trial.  Else the scene's goal alone.
   std::vector<scene::Goal> cycle = {};
   std::function<double()> now_s = {};  ///< clock for cycle times; empty: not timed
   std::function<bool()> stop = {};     ///< asked now and then; true: the trial ends as failed
+};
+
+/// What came of the obstacle stream's end.  Stale: older than PlannerOptions::stale_brake_s.
+struct Dropout {
+  double speed_radps = 0;  ///< of the fastest joint when the stream ended, and when it was stale
+  double stale_speed_radps = 0;
+  double stop_s = 0;   ///< from stale until every joint stays slower than kStill_radps
+  double least_s = 0;  ///< in which the joints' torques, less gravity, could take the momentum there was
+  bool told = true;    ///< every cycle from stale on was UNSAFE stale_obstacles
 };
 
 /// How a trial went, all of it measured from the arm's states and not taken from the planner's report, but
@@ -63,6 +79,7 @@ struct Trial {
   int contacts_by_arm = 0, contacts_by_others = 0;           ///< each counted once, where it begins
   std::uint64_t unsafe_cycles = 0, unreported_contacts = 0;  ///< the planner said UNSAFE; did not say contact
   double jerkiness = 0;                                      ///< total variation of qdd [rad/s^2 per s]
+  std::optional<Dropout> dropout;                            ///< where the trial lived to see it
   Durations cycle;
 };
 

@@ -111,19 +111,50 @@ TEST(Judge, FindsTheSmallestDistance) {
   EXPECT_NEAR(judge.clearance_min_m(), 0.05, 0.002);
 }
 
+scene::Scene drawn(const Cell& cell, const BenchRobots& robots, std::uint64_t seed, std::size_t index) {
+  return draw_scene(cell, robots, seed, index).value();
+}
+
+// Some of the Panda's links are 18 mm apart however it stands.
+TEST(BenchScenes, AnArmThatMustNotTouchItselfIsDrawnToo) {
+  const auto robots = bench_robots(ArmModel::full);
+  ASSERT_TRUE(robots);
+  Judge judge(robots.value().panda);
+  for (const auto& [family, spheres] :
+       {std::pair{"panda_static", 16}, std::pair{"panda_moving", 8}, std::pair{"panda_crowd", 256}}) {
+    const auto s = draw_scene({family, spheres, ""}, robots.value(), 7, 0);
+    ASSERT_TRUE(s) << family;
+    EXPECT_GT(judge.self_clearance(s.value().q0),
+              settings({family, spheres, ""}, scene::Method::gyro).dmin_m);
+  }
+}
+
+TEST(BenchScenes, WhereNothingFitsThereIsAProblem) {
+  auto robots = bench_robots(ArmModel::prototype);
+  ASSERT_TRUE(robots);
+  scene::Robot& panda = robots.value().panda;
+  panda.self_pairs = {{0, 0}};  // touches itself everywhere
+  EXPECT_FALSE(draw_scene({"panda_static", 1, ""}, robots.value(), 7, 0));
+  int asked = 0;
+  EXPECT_FALSE(draw_scene({"panda_static", 1, ""}, robots.value(), 7, 0, [&] { return ++asked > 3; }));
+  EXPECT_EQ(asked, 4);
+}
+
 TEST(BenchScenes, TheSameSeedGivesTheSameScene) {
   const auto robots = bench_robots(ArmModel::prototype);
   ASSERT_TRUE(robots);
   const auto all = cells({}, {});
   ASSERT_TRUE(all);
   for (const Cell& cell : all.value()) {
-    const scene::Scene a = draw_scene(cell, robots.value(), 7, 3), b = draw_scene(cell, robots.value(), 7, 3);
+    const scene::Scene a = drawn(cell, robots.value(), 7, 3), b = drawn(cell, robots.value(), 7, 3);
     EXPECT_EQ(a.q0, b.q0) << cell.family;
     EXPECT_EQ(a.goal->X_WG.p, b.goal->X_WG.p);
     EXPECT_EQ(a.perception.obstacles.size(), static_cast<std::size_t>(cell.spheres));
-    EXPECT_NE(draw_scene(cell, robots.value(), 8, 3).q0, a.q0);
+    if (!has_own_step(cell)) {
+      EXPECT_NE(drawn(cell, robots.value(), 8, 3).q0, a.q0);
+    }
     scene::Scene s = a;
-    s.planner = settings(cell, scene::Method::gyro);
+    s.planner = settings(cell, scene::Method::gyro, 3);
     EXPECT_TRUE(scene::problems(s).empty()) << cell.family;
   }
 }
@@ -138,7 +169,7 @@ TEST(BenchSubset, GyroReachesAndTouchesNothing) {
     const Cell cell{family, spheres, ""};
     int reached = 0, touched = 0;
     for (int k = 0; k < scenes; ++k) {
-      scene::Scene s = draw_scene(cell, robots.value(), 11, static_cast<std::size_t>(k));
+      scene::Scene s = drawn(cell, robots.value(), 11, static_cast<std::size_t>(k));
       s.planner = settings(cell, scene::Method::gyro);
       const Trial t = run_trial(s);
       reached += t.ending == Ending::reached;
@@ -147,6 +178,42 @@ TEST(BenchSubset, GyroReachesAndTouchesNothing) {
     }
     EXPECT_GE(reached, least) << family;
     EXPECT_EQ(touched, 0) << family;
+  }
+}
+
+// Each value of each axis of the grid at least once.
+TEST(BenchSubset, GyroReachesOverTheGridOfExample52) {
+  const auto robots = bench_robots(ArmModel::prototype);
+  ASSERT_TRUE(robots);
+  for (const char* variant : {"vmax 1", "no vmax"})
+    for (std::size_t k = 0; k < 192; k += 31) {
+      const Cell cell{"example_5_2_grid", 1, variant};
+      scene::Scene s = drawn(cell, robots.value(), 1, k);
+      s.planner = settings(cell, scene::Method::gyro, k);
+      const Trial t = run_trial(s);
+      EXPECT_EQ(t.ending, Ending::reached) << variant << " " << k << ": " << to_string(t.ending);
+    }
+}
+
+// Nothing is told of the obstacles any more while the arm is on its way: it says so and stands.
+TEST(BenchSubset, ArmsStopWhenTheObstacleStreamEnds) {
+  for (const ArmModel model : {ArmModel::prototype, ArmModel::full}) {
+    const auto robots = bench_robots(model);
+    ASSERT_TRUE(robots);
+    const Cell cell{"panda_moving", 1, ""};
+    int moving = 0;
+    for (std::size_t k = 0; k < 10; ++k) {
+      scene::Scene s = drawn(cell, robots.value(), 5, k);
+      s.planner = settings(cell, scene::Method::gyro);
+      TrialOptions o;
+      o.dropout_s = 0.3 + 0.1 * static_cast<double>(k);
+      const Trial t = run_trial(s, o);
+      if (!t.dropout || t.ending == Ending::collided) continue;
+      moving += t.dropout->speed_radps > kStill_radps;
+      EXPECT_TRUE(t.dropout->told) << k;
+      EXPECT_LE(t.dropout->stop_s, std::max(0.1, t.dropout->least_s)) << k;
+    }
+    EXPECT_GE(moving, 8);
   }
 }
 
