@@ -37,8 +37,9 @@ Duration_t duration(std::chrono::milliseconds ms) {
   return Duration_t(static_cast<long double>(ms.count()) * 1e-3L);
 }
 
-/// A late Cyclone reader waits for the writer's next heartbeat; Fast DDS's default is 3 s.
-constexpr std::chrono::milliseconds kHeartbeat{100};
+/// A late Cyclone reader waits for the writer's next heartbeat, and so does what was lost on the way: it must
+/// be repeated before a command is stale.  Fast DDS's default is 3 s.
+constexpr std::chrono::milliseconds kHeartbeat{10};
 
 /// The part of QoS that writers and readers share.
 template <class Qos>
