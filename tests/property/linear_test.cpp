@@ -67,12 +67,13 @@ TYPED_TEST(Recursion, OfAStageIsLinear) {
     Load<G> load(n);
     load.pushed = true;
     const double a = 0.5;
-    const std::vector<double> q(size, 0.1), p(size, 0.2), inertia(size, 1), V(size, 0.3), F(size, 0.4);
-    std::vector<double> V_next(size), F_next(size), applied(size);
+    const std::vector<double> q(size, 0.1), p(size, 0.2), inertia(size, 1), past(2 * size, 0.3);
+    std::vector<double> V(size), F(size), V_next(size), F_next(size), applied(size), scale_inv(size);
     std::vector<unsigned char> scratch(scratch_bytes<G>(n));
     StageJob<G> job;
     job.chain = &chain, job.load = &load, job.tau = load.tau.data();
-    job.h = 0.01, job.stop_stiffness = 1, job.stages = job.padded = 1, job.a = &a;
+    job.h = 0.01, job.stop_stiffness = 1, job.stages = job.padded = 1, job.a = job.extrapolate = &a;
+    job.past = past.data(), job.scale_inv = scale_inv.data();
     job.q = q.data(), job.p = p.data(), job.inertia = inertia.data(), job.V = V.data(), job.F = F.data();
     job.V_next = V_next.data(), job.F_next = F_next.data(), job.applied = applied.data();
     job.scratch = scratch.data();
