@@ -112,7 +112,7 @@ class Fastest(unittest.TestCase):
         self.assertEqual(cost["reduced"]["dt_s"], j["dt_s"])
         self.assertEqual(cost["without self"]["dt_s"], j["dt_s"])
         self.assertEqual(cost["without step"]["dt_s"], 0.001)
-        self.assertGreater(j["dt_s"], 0.001)
+        self.assertNotEqual(j["tier"], "midpoint", "another step was chosen")
         both = [cost[k]["dynamics_us"] + cost[k]["planner_us"] for k in ("reduced", "full")]
         self.assertAlmostEqual(cost["reduced"]["of_full"], both[0] / both[1] * 0.001 / j["dt_s"], 6)
 
