@@ -31,9 +31,9 @@ struct RobotPlace {
 ///
 /// Shapes: sphere, box, cylinder; a cylinder with a sphere of its radius at each end is one capsule, and a
 /// cylinder of radius 0 is a segment.  Meshes are not read: where a link has nothing else, a capsule from its
-/// joint to the next, as thick as its inertia says, stands for it with a warning, unless NAME.spheres.textproto
-/// beside NAME.urdf gives spheres for it:  link { name: "hand" spheres { center_m: [0, 0, 0.05]
-/// radius_m: 0.06 } }
+/// joint to the next, as thick as its inertia says, stands for it with a warning, unless
+/// NAME.spheres.textproto beside NAME.urdf gives spheres for it:  link { name: "hand" spheres { center_m: [0,
+/// 0, 0.05] radius_m: 0.06 } }
 Checked<scene::Robot> load_urdf(const std::string& path, const RobotPlace& place = {});
 
 /// The same from text; `name` stands for the path in problems, `spheres` is the sidecar's text, empty: none.

@@ -33,7 +33,7 @@ struct Robot {
   model::Chain chain;
   std::vector<LinkShape> shapes;
   std::vector<std::string> warnings =
-      {};                    ///< what was read otherwise than written, e.g. "link hand: collision mesh not read"
+      {};  ///< what was read otherwise than written, e.g. "link hand: collision mesh not read"
   std::string spheres = {};  ///< text of the sidecar with collision spheres; empty: none
   int fixed_joints = 0;      ///< of the file, lumped
   /// Indices of shapes that must not touch each other, that of the link nearer to the base first; see
