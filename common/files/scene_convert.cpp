@@ -138,6 +138,7 @@ void read_planner(const Fields& read, scene::PlannerOptions& o, std::string& bus
   read("stale_brake_s", o.stale_brake_s);
   read("stale_slow_s", o.stale_slow_s);
   read("assumed_speed_mps", o.assumed_speed_mps);
+  read("assumed_acceleration_mps2", o.assumed_acceleration_mps2);
   read("stale_state_s", o.stale_state_s);
   read("brake_rate", o.brake_rate);
   read("ramp_s", o.ramp_s);
@@ -245,6 +246,7 @@ void read_perception(const text::Perception& m, SceneParts& out) {
   stream("loop", s.loop);
   stream("glitch_mps", s.glitch_mps);
   stream("until_s", s.until_s);
+  stream("causal", s.causal);
   stream("topic", s.topic);
   out.stream_start_given = m.stream().has_start_s();
 }

@@ -30,9 +30,10 @@ struct RobotPlace {
 /// joints behind the last moving link, or that link itself where several branches hang on it.
 ///
 /// Shapes: sphere, box, cylinder; a cylinder with a sphere of its radius at each end is one capsule, and a
-/// cylinder of radius 0 is a segment.  A mesh is left out with a warning, unless NAME.spheres.textproto
-/// beside NAME.urdf gives spheres for its link:  link { name: "hand" spheres { center_m: [0, 0, 0.05]
-/// radius_m: 0.06 } }
+/// cylinder of radius 0 is a segment.  Meshes are not read: where a link has nothing else, a capsule from its
+/// joint to the next, as thick as its inertia says, stands for it with a warning, unless
+/// NAME.spheres.textproto beside NAME.urdf gives spheres for it:  link { name: "hand" spheres { center_m: [0,
+/// 0, 0.05] radius_m: 0.06 } }
 Checked<scene::Robot> load_urdf(const std::string& path, const RobotPlace& place = {});
 
 /// The same from text; `name` stands for the path in problems, `spheres` is the sidecar's text, empty: none.

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "common/files/text_fields.h"
 
@@ -70,6 +71,54 @@ bool to_shape(const urdf::Geometry& g, Shape& out) {
   return false;
 }
 
+constexpr double kMeshRadius_m = 0.06;                            // where a link has no inertia
+constexpr double kLeastRadius_m = 0.01, kGreatestRadius_m = 0.2;  // that an inertia is believed
+
+/// Where the links behind this one begin, the farthest; of a last link: as far again as its centre of mass.
+Eigen::Vector3d far_end(const urdf::Link& link) {
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  if (link.child_joints.empty() && link.inertial) return 2 * to_pose(link.inertial->origin).p;
+  for (const urdf::JointSharedPtr& j : link.child_joints) {
+    const Eigen::Vector3d p = to_pose(j->parent_to_joint_origin_transform).p;
+    if (p.norm() > end.norm()) end = p;
+  }
+  return end;
+}
+
+/// Of the solid cylinder about the line from 0 along `axis` with the link's moment of inertia, m r^2 / 2.
+double radius_from_inertia(const urdf::Link& link, const Eigen::Vector3d& axis) {
+  if (!link.inertial || !(link.inertial->mass > 0)) return kMeshRadius_m;
+  const urdf::Inertial& i = *link.inertial;
+  Eigen::Matrix3d I;
+  I << i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz;
+  const lie::Pose X_LC = to_pose(i.origin);
+  const Eigen::Vector3d u_C = X_LC.R.transpose() * axis;
+  const double about_line = u_C.dot(I * u_C) + i.mass * X_LC.p.cross(axis).squaredNorm();
+  return std::clamp(std::sqrt(std::max(2 * about_line / i.mass, 0.0)), kLeastRadius_m, kGreatestRadius_m);
+}
+
+/// What stands for a link of which only a mesh is known: a capsule from its joint to the next.
+Placed fitted_capsule(const urdf::Link& link) {
+  const Eigen::Vector3d end = far_end(link);
+  const double length = end.norm();
+  const Eigen::Vector3d axis = length > 1e-9 ? Eigen::Vector3d(end / length) : Eigen::Vector3d::UnitZ();
+  Placed p;
+  p.shape = {ShapeKind::capsule, {radius_from_inertia(link, axis), length, 0}};
+  p.X_LS.p = 0.5 * end;
+  p.X_LS.R = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+  return p;
+}
+
+std::string said(const Placed& capsule, bool from_inertia) {
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "a capsule of radius %.3g m and length %.3g m stands for it, from its joint to the next (radius: %s)",
+      capsule.shape.dims_m[0], capsule.shape.dims_m[1],
+      from_inertia ? "of its inertia" : "assumed, it has no inertia");
+  return text;
+}
+
 }  // namespace
 
 lie::Pose to_pose(const urdf::Pose& pose) {
@@ -120,9 +169,14 @@ void append_shapes(const urdf::Link& link, int carrier, const lie::Pose& X_NL, c
     p.X_LS = to_pose(c->origin);
     all.push_back(p);
   }
-  if (meshes > 0 && given == sidecar.end())
-    warnings.push_back("link " + link.name +
-                       ": collision mesh left out, the planner does not see it (give spheres in a sidecar)");
+  if (meshes > 0 && given == sidecar.end()) {
+    const bool alone = all.empty();
+    if (alone) all.push_back(fitted_capsule(link));
+    warnings.push_back("link " + link.name + ": collision mesh not read; " +
+                       (alone ? said(all.back(), link.inertial && link.inertial->mass > 0)
+                              : std::string("its other shapes stand for it")) +
+                       " (give spheres in a sidecar)");
+  }
   merge_capsules(all);
   if (given != sidecar.end())
     for (const SidecarSphere& s : given->second)

@@ -25,7 +25,8 @@ using Sidecar = std::map<std::string, std::vector<SidecarSphere>>;
 Checked<Sidecar> parse_sidecar(const std::string& text, const std::string& name);
 
 /// Appends the shapes of `link`, whose frame stands at X_NL in the frame of chain link `carrier` (-1: the
-/// base). A mesh with no spheres in the sidecar is left out with a warning.
+/// base). A link of meshes alone with no spheres in the sidecar becomes a capsule from
+/// its joint to the next, as thick as its inertia says, with a warning.
 void append_shapes(const urdf::Link& link, int carrier, const lie::Pose& X_NL, const Sidecar& sidecar,
                    std::vector<scene::LinkShape>& shapes, std::vector<std::string>& warnings);
 

@@ -57,6 +57,7 @@ void check_states(const PlannerOptions& o, Rules& r) {
   r.positive("stale_state_s", o.stale_state_s);
   r.positive("brake_rate", o.brake_rate);
   r.not_negative("assumed_speed_mps", o.assumed_speed_mps);
+  r.not_negative("assumed_acceleration_mps2", o.assumed_acceleration_mps2);
   r.not_negative("ramp_s", o.ramp_s);
   r.must(o.escapes >= 0, "escapes", o.escapes, ">= 0");
   r.must(o.escape_rollouts >= 1, "escape_rollouts", o.escape_rollouts, ">= 1");

@@ -81,11 +81,12 @@ struct PlannerOptions {
   double stale_state_s = 0.05;         ///< arm state older than this: brake and UNSAFE, > 0
   double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
   double assumed_speed_mps =
-      0;                        ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
-  int escapes = 8;              ///< gyro: ways out looked for by rollouts at one goal, 0: none
-  int escape_rollouts = 16;     ///< waypoints tried for one way out, >= 1
-  double escape_horizon_s = 8;  ///< how far ahead a rollout looks, > 0
-  double escape_delay_s = 0.2;  ///< the answer enters so long after the question, >= 0
+      1;  ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
+  double assumed_acceleration_mps2 = 1;  ///< a of the inflation a/2 age^2 of every obstacle, >= 0
+  int escapes = 8;                       ///< gyro: ways out looked for by rollouts at one goal, 0: none
+  int escape_rollouts = 16;              ///< waypoints tried for one way out, >= 1
+  double escape_horizon_s = 8;           ///< how far ahead a rollout looks, > 0
+  double escape_delay_s = 0.2;           ///< the answer enters so long after the question, >= 0
   /// A target that no configuration meets, or that an obstacle stands over: STUCK at once and no motion, or
   /// as near as can be and then STUCK.
   Unreachable unreachable = Unreachable::reject;

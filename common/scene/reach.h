@@ -98,6 +98,7 @@ class Reach {
   std::vector<double> near_m_, nearest_m_;  ///< scratch: distances of obstacles, and the least
   std::vector<std::size_t> left_;           ///< scratch: what sift_roughly() leaves
   double rho0_m_ = 0, margin_m_ = 0;
+  double accelerates_m_ = 0;  ///< what assumed acceleration adds to an obstacle before it is too old
 };
 
 }  // namespace hamel::scene

@@ -1,5 +1,6 @@
 #include "common/scene/scene.h"
 
+#include <cmath>
 #include <numbers>
 #include <set>
 
@@ -221,6 +222,40 @@ Problems problems(const Scene& s) {
 
 std::uint64_t fingerprint(const Scene& s) { return hashed(s.robot.urdf + '\0', hashed(s.text + '\0')); }
 
+namespace {
+
+// G of Eq. (20) where it is largest.
+double greatest_gain(const PlannerOptions& o) {
+  switch (o.gain_form) {
+    case GainForm::F1:
+      return std::expm1(std::numbers::pi / 2);
+    case GainForm::F2:
+      return std::exp(1 / o.phi_min_rad);
+    case GainForm::F3:
+      return std::exp(std::numbers::pi / 2 - 1);
+    case GainForm::S:
+      break;
+  }
+  return 0;  // grows with speed
+}
+
+// What goes too far within one period: the arm, and the turn of a force that is applied explicitly.
+void append_warnings_of_the_period(const Scene& s, std::vector<std::string>& out) {
+  const PlannerOptions& o = s.planner;
+  const double period_s = o.period_steps * s.dynamics.dt_s;
+  const double way = o.vmax_mps * period_s;
+  if (o.method == Method::gyro && o.barrier_gain > 0 && std::isfinite(way) && !(way < 0.5 * o.dmin_m))
+    out.push_back("planner.vmax_mps * period = " + number(way) + " m is not below half of dmin_m = " +
+                  number(o.dmin_m) + ": the arm may pass the clearance within a period");
+  const double overshoots = o.kobs * greatest_gain(o) * period_s;  // where k dt = 1
+  if (o.method == Method::gyro_paper && o.mapping == Mapping::paper && overshoots > 0.25 * o.rho0_m)
+    out.push_back("planner.kobs * G * period = " + number(overshoots) +
+                  " m: nearer than that to an obstacle, of rho0_m = " + number(o.rho0_m) +
+                  ", the gyroscopic force overshoots within a period");
+}
+
+}  // namespace
+
 std::vector<std::string> warnings(const Scene& s) {
   std::vector<std::string> out = s.robot.warnings;
   const PlannerOptions& o = s.planner;
@@ -230,6 +265,7 @@ std::vector<std::string> warnings(const Scene& s) {
     out.push_back("planner.barrier_gain * rho0_m = " + number(o.barrier_gain * o.rho0_m) +
                   " m/s is below the largest closing speed " + number(closing) +
                   " m/s: the barrier may come too late");
+  if (s.steered) append_warnings_of_the_period(s, out);
   if (s.steered && !s.goal) out.push_back("no goal: the planner stays IDLE until one is sent");
   if (s.steered && o.period_steps * s.dynamics.dt_s > 0.02)
     out.push_back("a command every " + number(o.period_steps * s.dynamics.dt_s) + " s is slow for avoidance");

@@ -33,7 +33,7 @@ struct Robot {
   model::Chain chain;
   std::vector<LinkShape> shapes;
   std::vector<std::string> warnings =
-      {};                    ///< what was read otherwise than written, e.g. "link hand: mesh left out"
+      {};  ///< what was read otherwise than written, e.g. "link hand: collision mesh not read"
   std::string spheres = {};  ///< text of the sidecar with collision spheres; empty: none
   int fixed_joints = 0;      ///< of the file, lumped
   /// Indices of shapes that must not touch each other, that of the link nearer to the base first; see
@@ -73,6 +73,7 @@ struct Stream {
   double until_s = std::numeric_limits<double>::infinity();  ///< later samples are left out, >= the first's
   bool loop = false;                  ///< begins anew, one sample interval behind its end
   double glitch_mps = 10;             ///< a larger speed between two samples is taken for a wrong sample, > 0
+  bool causal = false;                ///< nothing is known of a sample before its time
   std::vector<StreamSample> samples;  ///< what the file holds, in stream frame and stream time
   std::vector<double> empty_s;        ///< times at which it says that nothing is there
 };

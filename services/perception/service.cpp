@@ -46,6 +46,7 @@ bool PerceptionService::poll(Time now) {
       published = publish_until(run_time_s(now));
     }
   }
+  if (published) count_glitches(now);
   if (now - last_status_ >= 500ms) publish_status(now, wire::ServiceState::ready);
   return heard || published;
 }
@@ -135,14 +136,23 @@ runtime::Clock::time_point PerceptionService::due() const {
   return std::min(clock_heard_ + runtime::seconds(wait_s), last_status_ + 500ms);
 }
 
+/// Wrong samples of the stream, once the world has come by them.
+void PerceptionService::count_glitches(Time now) {
+  const std::uint64_t passed = source_.glitches(shown_s());
+  if (passed > glitches_ && glitch_log_(now))
+    spdlog::warn("{:.3f} s: {} wrong samples of the stream passed over so far", shown_s(), passed);
+  glitches_ = passed;
+}
+
 void PerceptionService::publish_status(Time now, wire::ServiceState state) {
   last_status_ = now;
-  presence_.say(
-      now, {.state = state,
-            .incarnation = set_.incarnation,
-            .detail = source_.is_static() ? "static obstacles" : "moving obstacles",
-            .counters = {
-                {"sets", published_}, {"repeated", repeated_}, {"undecodable", clock_in_.undecodable()}}});
+  presence_.say(now, {.state = state,
+                      .incarnation = set_.incarnation,
+                      .detail = source_.is_static() ? "static obstacles" : "moving obstacles",
+                      .counters = {{"sets", published_},
+                                   {"repeated", repeated_},
+                                   {"glitches", glitches_},
+                                   {"undecodable", clock_in_.undecodable()}}});
 }
 
 void PerceptionService::close() { publish_status(runtime::Clock::now(), wire::ServiceState::stopping); }

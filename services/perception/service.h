@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "common/runtime/log.h"
 #include "common/runtime/loop.h"
 #include "common/runtime/presence.h"
 #include "common/scene/scene.h"
@@ -47,6 +48,7 @@ class PerceptionService final : public runtime::Service {
   bool publish_until(double t_s);
   bool publish_set(std::uint64_t k, bool promise);
   std::uint64_t after(std::uint64_t k) const;
+  void count_glitches(Time now);
   void publish_status(Time now, wire::ServiceState state);
 
   const std::uint32_t arm_;
@@ -60,7 +62,8 @@ class PerceptionService final : public runtime::Service {
   bus::WriterId clock_writer_{};
   Time clock_heard_{}, last_status_{};
   std::optional<std::uint64_t> next_;  ///< number of the next set; none: not begun
-  std::uint64_t published_ = 0, repeated_ = 0;
+  std::uint64_t published_ = 0, repeated_ = 0, glitches_ = 0;
+  runtime::RateLimit glitch_log_;
   bool controlled_ = false, paused_ = false;
   std::uint64_t steps_ = 0;  ///< asked for and not made yet
   std::int64_t shown_ = 0;   ///< what the last set showed, as its number without pauses

@@ -166,10 +166,18 @@ TEST(Urdf, CylinderWithTwoSpheresIsACapsule) {
   EXPECT_EQ(r.shapes[2].shape.dims_m[0], 0);
 }
 
-TEST(Urdf, MeshIsLeftOutAloudOrGivenSpheres) {
+TEST(Urdf, MeshIsACapsuleAloudOrGivenSpheres) {
   const std::string mesh =
       inertial("1") + "<collision><geometry><mesh filename='a.stl'/></geometry></collision>";
-  EXPECT_TRUE(warned(load(arm("", mesh)), "link a: collision mesh left out"));
+  const std::string next =
+      joint("j2", "continuous", "a", "b", "<origin xyz='0 0.3 0.4'/><axis xyz='0 0 1'/>");
+  const scene::Robot fitted = load(arm(next + link("b"), mesh));
+  EXPECT_TRUE(warned(fitted, "link a: collision mesh not read; a capsule of radius 0.2 m and length 0.5 m"));
+  ASSERT_EQ(fitted.shapes.size(), 1u);
+  const scene::LinkShape& capsule = fitted.shapes[0];
+  EXPECT_EQ(capsule.shape.kind, geometry::ShapeKind::capsule);
+  EXPECT_LT((capsule.X_LS * Eigen::Vector3d(0, 0, -0.25)).norm(), 1e-12);
+  EXPECT_LT((capsule.X_LS * Eigen::Vector3d(0, 0, 0.25) - Eigen::Vector3d(0, 0.3, 0.4)).norm(), 1e-12);
   const std::string spheres = "link { name: 'a' spheres { center_m: [1, 2, 3] radius_m: 0.5 } }";
   const scene::Robot r = load(arm("", mesh), {}, spheres);
   EXPECT_TRUE(r.warnings.empty()) << r.warnings.front();

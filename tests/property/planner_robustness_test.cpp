@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "common/rbd/rbd.h"
+#include "common/scene/self_links.h"
 #include "tests/support/no_alloc.h"
 #include "tests/support/planner_scene.h"
 #include "tests/support/soak.h"
@@ -33,6 +34,7 @@ scene::Robot random_robot(Random& rng, int n) {
     if (rng.coin(0.3))
       robot.shapes.push_back({i, {geometry::ShapeKind::box, {0.1, 0.2, 0.05}}, rng.pose(0.2)});
   }
+  if (n >= 3 && rng.coin(0.5)) scene::watch(robot, {{0, n - 1}});
   return robot;
 }
 
@@ -51,6 +53,7 @@ scene::PlannerOptions random_options(Random& rng, Method method) {
   o.vmax_mps = rng.coin(0.5) ? 0.5 : scene::kInf;
   o.amax = rng.coin(0.2) ? 5 : scene::kInf;
   o.assumed_speed_mps = 0.5;
+  if (rng.coin(0.3)) o.unreachable = scene::Unreachable::approach;
   return o;
 }
 
@@ -64,6 +67,8 @@ geometry::Obstacle random_obstacle(Random& rng, const rbd::Workspace& ws) {
   if (rng.coin(0.2)) o.X_WO.p = ws.X_WB[link].p;  // on the joint, so often on the axis of a link
   if (rng.coin(0.5)) o.V_WO << rng.vec3(1), rng.vec3(1);
   o.velocity_known = rng.coin(0.8);
+  if (rng.coin(0.02)) o.V_WO[4] = rng.coin(0.5) ? 1e9 : kNaN;
+  if (rng.coin(0.02)) o.V_WO[1] = 1e9;
   o.sigma_m = rng.coin(0.3) ? 0.01 : 0;
   if (rng.coin(0.02)) o.X_WO.p[0] = kNaN;
   if (rng.coin(0.02)) o.shape.dims_m[0] = rng.coin(0.5) ? -1 : scene::kInf;
@@ -118,6 +123,9 @@ scene::Goal random_goal(Random& rng, int n, std::uint64_t id) {
   goal.X_WG = rng.pose(1);
   if (rng.coin(0.3)) goal.V_WG << rng.vec3(0.2), rng.vec3(0.2);
   goal.joints = rng.vector(n, 3);
+  if (rng.coin(0.05)) goal.X_WG.p[1] = kNaN;
+  if (rng.coin(0.05)) goal.joints[0] = kNaN;
+  if (rng.coin(0.05)) goal.V_WG[4] = 1e6;
   return goal;
 }
 
@@ -173,6 +181,11 @@ TEST_P(ForMethod, FuzzedCyclesStayFiniteRepeatAndContinueFromMemory) {
       if (rng.coin(0.3)) f = random_cycle(rng, robot.chain, ws);  // else the same again: holds stay alive
       steady.plan(input(f, k), a);
       interrupted.plan(input(f, k), b);
+      if (k % 40 == 20) {  // an answer, asked for or not
+        const Eigen::VectorXd waypoint = rng.coin(0.7) ? rng.vector(n, 2) : Eigen::VectorXd();
+        steady.take_escape(waypoint, input(f, k).t_s);
+        interrupted.take_escape(waypoint, input(f, k).t_s);
+      }
       ASSERT_TRUE(a.torque_Nm.allFinite()) << "robot " << robot_index << " cycle " << k;
       ASSERT_TRUE(finite(a.report)) << "robot " << robot_index << " cycle " << k;
       ASSERT_TRUE(same_bits(a, b)) << "robot " << robot_index << " cycle " << k;

@@ -220,7 +220,7 @@ TEST(Source, SameTimeSameBitsInAnyOrder) {
   for (int k = 99; k >= 0; --k) EXPECT_EQ(at(s, 0.0123 * k)[0].X_WO.p, forth[static_cast<std::size_t>(k)]);
 }
 
-TEST(Source, AGlitchOfThirtyMetresASecondGivesNoVelocity) {
+TEST(Source, AGlitchOfThirtyMetresASecondIsPassedOverAndCounted) {
   std::vector<Row> samples;
   for (int i = 0; i < 10; ++i) samples.push_back({i * 0.1, 1, {0.1 * i, 0, 0}, 0.1});  // 1 m/s along x
   samples[5].p_m.y() = 3;                                                              // and back: 30 m/s
@@ -230,10 +230,27 @@ TEST(Source, AGlitchOfThirtyMetresASecondGivesNoVelocity) {
     ASSERT_EQ(o.size(), 1u);
     EXPECT_TRUE(o[0].velocity_known) << k;
     EXPECT_LT((o[0].V_WO.tail<3>() - Eigen::Vector3d(1, 0, 0)).norm(), 1e-9) << k;
+    EXPECT_LT((o[0].X_WO.p - Eigen::Vector3d(k / 30.0, 0, 0)).norm(), 1e-9) << k;
+    EXPECT_EQ(s.glitches(k / 30.0), k >= 15) << k;
   }
   auto all = with_stream(samples);
   all.stream->glitch_mps = 100;
   EXPECT_GT(at(make(all), 0.45)[0].V_WO.norm(), 29) << "the guard can be turned off";
+}
+
+TEST(Source, ACausalStreamKnowsNothingOfTheNextSample) {
+  std::vector<Row> samples;
+  for (int i = 0; i < 4; ++i) samples.push_back({i * 0.4, 1, {0.4 * i, 0, 0}, 0.1});
+  samples[3].p_m.y() = 0.4;  // turns
+  auto options = with_stream(samples);
+  options.stream->causal = true;
+  const Source s = make(options);
+  EXPECT_FALSE(at(s, 0.2)[0].velocity_known);
+  EXPECT_EQ(at(s, 0.2)[0].X_WO.p, Eigen::Vector3d::Zero());
+  const Obstacle before = at(s, 1.1)[0], behind = at(s, 1.3)[0];
+  EXPECT_LT((before.X_WO.p - Eigen::Vector3d(1.1, 0, 0)).norm(), 1e-12) << "goes on from the last two";
+  EXPECT_LT((before.V_WO.tail<3>() - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((behind.X_WO.p - Eigen::Vector3d(1.3, 0.5, 0)).norm(), 1e-12);
 }
 
 TEST(Source, ASolidOfAStreamTurnsAndGrowsOnItsLine) {

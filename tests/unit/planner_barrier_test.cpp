@@ -104,11 +104,17 @@ TEST_P(ForObstacle, SecondDerivativeOfTheDistanceAgreesWithDifferences) {
     EXPECT_NEAR(rate, (after.distance_m - before.distance_m) / (2 * h), 1e-5) << k;
     const double measured = (after.distance_m - 2 * now.distance_m + before.distance_m) / (h * h);
     // an obstacle that turns accelerates its own points; the planner leaves that out
-    const Vector3d arm_o = now.on_axis + now.centre_m * now.normal - o.X_WO.p;
+    const bool flat = !std::isfinite(now.centre_m);
+    const double apart_m = flat ? (now.on_obstacle - now.on_axis).norm() : now.centre_m;
+    const Vector3d arm_o = now.on_axis + apart_m * now.normal - o.X_WO.p;
     const Vector3d omega = o.V_WO.head<3>();
-    EXPECT_NEAR(second + pair.n.dot(omega.cross(omega.cross(arm_o))), measured,
-                2e-3 * (1 + std::abs(measured)))
-        << k;
+    const double said = second + pair.n.dot(omega.cross(omega.cross(arm_o)));
+    const double most = 2e-3 * (1 + std::abs(measured));
+    // The rim of a cylinder counts as a line or a corner: it curves away, so that less comes out, never more.
+    if (GetParam().obstacle.kind == geometry::ShapeKind::cylinder)
+      EXPECT_LE(said, measured + most) << k;
+    else
+      EXPECT_NEAR(said, measured, most) << k;
     ++compared;
   }
   EXPECT_GT(compared, 100);
@@ -179,7 +185,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Passing{{ShapeKind::capsule, {0.05, 0.6, 0}}, {ShapeKind::sphere, {kRadius, 0, 0}}},
                     Passing{{ShapeKind::capsule, {0.05, 0.6, 0}}, {ShapeKind::capsule, {kRadius, 0.8, 0}}},
                     Passing{{ShapeKind::box, {0.3, 0.4, 0.6}}, {ShapeKind::sphere, {kRadius, 0, 0}}},
-                    Passing{{ShapeKind::box, {0.3, 0.4, 0.6}}, {ShapeKind::capsule, {kRadius, 0.8, 0}}}));
+                    Passing{{ShapeKind::box, {0.3, 0.4, 0.6}}, {ShapeKind::capsule, {kRadius, 0.8, 0}}},
+                    Passing{{ShapeKind::capsule, {0.05, 0.6, 0}}, {ShapeKind::half_space, {0, 0, 0}}},
+                    Passing{{ShapeKind::box, {0.3, 0.4, 0.6}}, {ShapeKind::box, {0.2, 0.5, 0.3}}},
+                    Passing{{ShapeKind::capsule, {0.05, 0.6, 0}}, {ShapeKind::cylinder, {kRadius, 0.8, 0}}}));
 
 }  // namespace
 }  // namespace hamel::planner

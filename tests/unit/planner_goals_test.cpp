@@ -119,6 +119,55 @@ TEST(Goals, OutOfReachIsApproachedWhenAsked) {
   EXPECT_NEAR((r.last.end_effector_m - Vector3d(2.4, 3.2, 0)).norm(), 0, 0.02);
 }
 
+TEST(Goals, JointsBeyondTheirLimitsAreRefusedOrApproached) {
+  scene::Robot robot = test::planar_arm(2, 0.1, 0.05);
+  model::ChainSpec spec = robot.chain.spec();
+  for (model::Joint& j : spec.joints) j.limits.lower = -1, j.limits.upper = 1;
+  robot.chain = test::checked(spec);
+  scene::Goal goal;
+  goal.id = 1;
+  goal.kind = scene::GoalKind::joints;
+  goal.joints = Eigen::Vector2d(0.5, 1.5);
+  scene::PlannerOptions o = planar_options();
+  for (const auto wish : {scene::Unreachable::reject, scene::Unreachable::approach}) {
+    o.unreachable = wish;
+    const bool approach = wish == scene::Unreachable::approach;
+    const test::RunResult r = test::run(robot, {}, o, goal, Eigen::Vector2d(0, 0), 2e-3, 10);
+    EXPECT_EQ(r.last.state, State::stuck);
+    EXPECT_EQ(r.last.reason, Reason::unreachable);
+    EXPECT_EQ(r.reached_at_s, -1);
+    EXPECT_NEAR((r.q - Eigen::Vector2d(0.5, 1)).norm(), 0, approach ? 0.02 : 2);
+    EXPECT_NEAR(r.last.target_error_m, approach ? 0.5 : 1.5, 0.02);
+    EXPECT_EQ(r.q.isZero(0), !approach);
+  }
+}
+
+// What stands in the way leads an arm about that has no goal to reach: it ends all the same, as near as it
+// came.
+TEST(Goals, ApproachEndsAmongObstacles) {
+  test::Random rng(17);
+  scene::PlannerOptions o = planar_options();
+  o.unreachable = scene::Unreachable::approach;
+  for (int k = 0; k < 10; ++k) {
+    std::vector<geometry::Obstacle> seen;
+    for (std::uint32_t i = 1; i <= 4; ++i)
+      seen.push_back(test::sphere(i, {rng.uniform(1, 4), rng.uniform(1, 4), 0}, 0.2));
+    scene::Goal goal;
+    goal.id = 1;
+    goal.X_WG.p = Vector3d(3, 4, 0);
+    double least = scene::kInf;
+    const test::RunResult r =
+        test::run(test::planar_arm(4, 0.1, 0.05), seen, o, goal, Eigen::Vector4d(-0.4, -0.8, 0.8, 0.8), 2e-3,
+                  30, [&](const test::RunResult& now) {
+                    least = std::min(least, now.last.target_error_m);
+                    return false;
+                  });
+    EXPECT_EQ(r.last.state, State::stuck) << k;
+    EXPECT_EQ(r.contact_at_s, -1) << k;
+    EXPECT_LT(r.last.target_error_m, least + 0.3) << k << ", once as near as " << least;
+  }
+}
+
 TEST(Goals, AMovingTargetIsFollowed) {
   scene::Goal goal;
   goal.id = 1;

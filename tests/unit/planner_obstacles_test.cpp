@@ -13,7 +13,7 @@ using planner::Obstacles;
 
 TEST(UnknownVelocity, IsEstimatedFromTwoSets) {
   scene::PlannerOptions o;
-  o.assumed_speed_mps = 1;
+  o.assumed_acceleration_mps2 = 0;
   Memory memory;
   Obstacles obstacles;
   geometry::Obstacle ball = sphere(5, {1, 0, 0}, 0.1);
@@ -21,7 +21,7 @@ TEST(UnknownVelocity, IsEstimatedFromTwoSets) {
   const Eigen::Vector3d v(0.5, -0.2, 0.1);
   obstacles.take({&ball, 1}, 0.05, 0.05, o, memory);  // stamped 0
   EXPECT_EQ(obstacles.velocities_unknown(), 1);
-  EXPECT_NEAR(obstacles.items()[0].inflation_m, 0.05, 1e-15);  // grows, stays
+  EXPECT_NEAR(obstacles.items()[0].inflation_m, 0.05, 1e-15);  // grows, stays; 1 m/s by default
   EXPECT_TRUE(obstacles.items()[0].now.V_WO.isZero());
   ball.X_WO.p += v / 30;
   for (const double age : {0.02, 0.05}) {  // stamped 1/30, looked at twice
@@ -32,6 +32,17 @@ TEST(UnknownVelocity, IsEstimatedFromTwoSets) {
     EXPECT_NEAR((item.now.X_WO.p - ball.X_WO.p - age * v).norm(), 0, 1e-12);
     EXPECT_EQ(item.inflation_m, 0);
   }
+}
+
+// Nobody knows how an obstacle went on since it was seen.
+TEST(Obstacle, GrowsWithTheAgeOfItsSight) {
+  scene::PlannerOptions o;
+  o.assumed_acceleration_mps2 = 3;
+  Memory memory;
+  Obstacles obstacles;
+  const geometry::Obstacle ball = sphere(5, {1, 0, 0}, 0.1, {1, 0, 0});
+  obstacles.take({&ball, 1}, 0.2, 0.2, o, memory);
+  EXPECT_NEAR(obstacles.items()[0].inflation_m, 0.06, 1e-15);
 }
 
 TEST(UnknownVelocity, JumpsAndGapsAreNoMotion) {
@@ -92,6 +103,7 @@ TEST(MovingObstacle, GoesOnAheadOfACycleAsItDoesWithAge) {
   const scene::Robot robot = planar_arm(1, 1.0 / 12, 0.05);
   scene::PlannerOptions o;
   o.rho0_m = 1;
+  o.assumed_acceleration_mps2 = 0;
   planner::Arm arm(robot.chain);
   arm.update(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
   geometry::Obstacle rod = sphere(1, {0.5, 0.8, 0}, 0, {0.1, -0.2, 0});

@@ -221,6 +221,25 @@ TEST(SceneWarnings, SpeakOfABarrierThatComesTooLate) {
   EXPECT_NE(warnings(s)[0].find("closing speed"), std::string::npos);
 }
 
+TEST(SceneWarnings, SpeakOfWhatGoesTooFarWithinAPeriod) {
+  Scene s = valid();
+  s.planner.vmax_mps = 4;
+  s.planner.dmin_m = 0.01;
+  s.dynamics.dt_s = 1e-3;
+  EXPECT_TRUE(warnings(s).empty());
+  s.planner.period_steps = 2;
+  ASSERT_EQ(warnings(s).size(), 1u);
+  EXPECT_NE(warnings(s)[0].find("= 0.008 m"), std::string::npos) << warnings(s)[0];
+  s.planner.method = Method::gyro_paper;
+  s.planner.gain_form = GainForm::F2;
+  s.planner.mapping = Mapping::paper;
+  s.planner.kobs = 1;
+  EXPECT_TRUE(warnings(s).empty());
+  s.planner.kobs = 16;
+  ASSERT_EQ(warnings(s).size(), 1u);
+  EXPECT_NE(warnings(s)[0].find("overshoots"), std::string::npos);
+}
+
 TEST(SceneNames, AreThoseOfTheTextFormat) {
   EXPECT_STREQ(to_string(Tier::semi_implicit_euler), "semi_implicit_euler");
   EXPECT_STREQ(to_string(Method::gyro_paper), "gyro_paper");

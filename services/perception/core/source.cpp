@@ -43,6 +43,7 @@ Source::Source(const scene::PerceptionOptions& options)
     stream_ = *options.stream;
     rate_hz_ = std::max(rate_hz_, kLeastStreamRate_hz);
     make_frames();
+    find_glitches();
   }
   most_ += scripted_.size();
 }
@@ -65,6 +66,41 @@ void Source::make_frames() {
   const bool steady = last > 0 && !is_gap(last - 1);
   const double interval_s = steady ? frames_[last].t_s - frames_[last - 1].t_s : stream_.rate / rate_hz_;
   end_s_ = frames_[last].t_s + interval_s;
+}
+
+double Source::speed_mps(const scene::StreamSample& a, const scene::StreamSample& b) const {
+  return stream_.scale * (b.p_m - a.p_m).norm() / (b.t_s - a.t_s);
+}
+
+/// A sample that is far from both its neighbours, which are near each other.
+void Source::find_glitches() {
+  for (std::size_t k = 1; k + 1 < frames_.size(); ++k) {
+    for (std::size_t i = frames_[k].begin; i < frames_[k].end; ++i) {
+      scene::StreamSample& here = stream_.samples[i];
+      const auto *before = find(k - 1, here.id), *next = find(k + 1, here.id);
+      if (before == nullptr || next == nullptr || is_gap(k - 1) || is_gap(k)) continue;
+      const double most = stream_.glitch_mps;
+      if (speed_mps(*before, here) <= most || speed_mps(here, *next) <= most ||
+          speed_mps(*before, *next) > most)
+        continue;
+      glitch_s_.push_back(here.t_s);
+      if (stream_.causal) continue;
+      here.p_m =
+          before->p_m + (next->p_m - before->p_m) * ((here.t_s - before->t_s) / (next->t_s - before->t_s));
+    }
+  }
+}
+
+std::size_t Source::glitches(double t_s) const {
+  if (frames_.empty()) return 0;
+  const auto until = [this](double s) {
+    return static_cast<std::size_t>(std::upper_bound(glitch_s_.begin(), glitch_s_.end(), s) -
+                                    glitch_s_.begin());
+  };
+  const double s = stream_.start_s + stream_.rate * seen(t_s), first = frames_.front().t_s;
+  const double laps = stream_.loop && s >= end_s_ ? std::floor((s - first) / (end_s_ - first)) : 0;
+  const auto passed = static_cast<std::size_t>(laps) * glitch_s_.size();
+  return passed + until(stream_time(t_s)) - until(stream_.start_s);
 }
 
 /// The time that a set with this stamp shows.
@@ -137,7 +173,7 @@ geometry::Obstacle Source::place(std::size_t frame, const scene::StreamSample& s
   out.shape = sample.shape;
   out.sigma_m = sample.sigma_m * stream_.scale;
   const double since_s = stream_t_s - frames_[frame].t_s;
-  const auto now = velocity(frame, sample.id);
+  const auto now = stream_.causal ? std::nullopt : velocity(frame, sample.id);
   const auto before = frame > 0 ? velocity(frame - 1, sample.id) : std::nullopt;
   if (now) {
     const geometry::Shape& next = find(after(frame), sample.id)->shape;
@@ -146,7 +182,8 @@ geometry::Obstacle Source::place(std::size_t frame, const scene::StreamSample& s
   }
   const lie::Twist V_S = now ? *now : before.value_or(lie::Twist::Zero());
   out.velocity_known = false;
-  for (const auto& v : {now, before, velocity(frame + 1, sample.id)}) {
+  const auto behind = stream_.causal ? std::nullopt : velocity(frame + 1, sample.id);
+  for (const auto& v : {now, before, behind}) {
     if (out.velocity_known || !v || v->tail<3>().norm() * stream_.scale > stream_.glitch_mps ||
         !(now || before))
       continue;

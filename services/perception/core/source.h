@@ -24,10 +24,12 @@ inline constexpr double kLeastStreamRate_hz = 30;
 /// Stream: time in it is start_s + rate t.  Between two of its times an obstacle moves on the straight line
 /// between its two places, with that line's velocity.  An id that is absent from the next time goes on with
 /// its last velocity until then and is gone after; one that is seen a single time stands there with its
-/// velocity unknown.  Turning and sizes go the same way.  A velocity over Stream::glitch_mps is that of a
-/// wrong sample and not used.  Flaws, where the options have them, are the same each time for the same set.
-/// Before the first sample and behind the end there is nothing; the end is one sample interval behind the
-/// last.
+/// velocity unknown.  Turning and sizes go the same way.  A sample that is reached and left faster than
+/// Stream::glitch_mps, while its neighbours fit each other, is wrong: the obstacle goes on between those.  A
+/// velocity over that is not used.  Causal streams know nothing of a sample before its time: obstacles go on
+/// from their last two, and a wrong one is seen where it says.  Flaws, where the options have them, are the
+/// same each time for the same set. Before the first sample and behind the end there is nothing; the end is
+/// one sample interval behind the last.
 class Source {
  public:
   /// The source, or what scene::problems() says of the options.  Copies the stream's samples.
@@ -47,6 +49,8 @@ class Source {
   /// Time between sets [s].
   double period_s() const noexcept { return 1 / rate_hz_; }
   std::size_t most_obstacles() const noexcept { return most_; }
+  /// Wrong samples of the stream that the run has come by until t_s.
+  std::size_t glitches(double t_s) const;
 
  private:
   /// The samples of one time, sorted by id; none: nothing is there.
@@ -57,6 +61,8 @@ class Source {
 
   explicit Source(const scene::PerceptionOptions& options);
   void make_frames();
+  void find_glitches();
+  double speed_mps(const scene::StreamSample& a, const scene::StreamSample& b) const;
   std::size_t after(std::size_t frame) const;
   double span_s(std::size_t frame) const;
   double seen(double t_s) const;
@@ -73,6 +79,7 @@ class Source {
   scene::Stream stream_;
   std::optional<scene::Flaws> flaws_;
   std::vector<Frame> frames_;
+  std::vector<double> glitch_s_;  ///< stream times of wrong samples, in order
   double rate_hz_ = 0;
   double end_s_ = 0;  ///< stream time at which the last frame is over
   std::size_t most_ = 0;

@@ -169,14 +169,29 @@ void Barrier::add_torque_rows(const Arm& arm) noexcept {
   }
 }
 
+// Takes a to the minimum under the rows there are; false where the search for it did not end.
+bool Barrier::settle(const Arm& arm, VectorXd& a) noexcept {
+  for (Eigen::Index i = 0; i < rows_; ++i) s_[i] = (b_[i] - A_.col(i).dot(a)) / length_[i];
+  const bool solved = least_norm_.solve(C_, s_, give_, rows_);
+  x_ = least_norm_.x();
+  arm.M_llt.matrixU().solveInPlace(x_);
+  a += x_;
+  return solved;
+}
+
+void Barrier::keep_torque(const Arm& arm, VectorXd& a) noexcept {
+  rows_ = 0;
+  add_torque_rows(arm);
+  (void)settle(arm, a);
+}
+
 Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& a) noexcept {
   rows_ = 0;
   gain_ = std::min(options_.barrier_gain, kGainPerStep / dt_s);
   add_pair_rows(arm, pairs);
   add_joint_rows(arm, dt_s);
   add_torque_rows(arm);
-  for (Eigen::Index i = 0; i < rows_; ++i) s_[i] = (b_[i] - A_.col(i).dot(a)) / length_[i];
-  const bool solved = least_norm_.solve(C_, s_, give_, rows_);
+  const bool solved = settle(arm, a);
   const VectorXd& u = least_norm_.multipliers();
   Outcome outcome;
   outcome.rows = static_cast<int>(rows_);
@@ -187,9 +202,6 @@ Barrier::Outcome Barrier::solve(const Arm& arm, Pairs& pairs, double dt_s, Vecto
   for (Eigen::Index i = 0; i < hard_rows_; ++i)
     if (give_[i] * u[i] * length_[i] > afford) outcome.infeasible = true;
   for (Eigen::Index i = torque_row_; i < rows_; ++i) outcome.torque_bound |= u[i] > 0;
-  x_ = least_norm_.x();
-  arm.M_llt.matrixU().solveInPlace(x_);
-  a += x_;
   for (int j = 0; j < arm.n(); ++j) {
     const double most = kMostOver * acceleration_limit(arm, j), wanted = a[j];
     a[j] = std::clamp(wanted, -most, most);

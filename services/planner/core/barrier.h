@@ -41,6 +41,8 @@ class Barrier {
   static constexpr double kMostOver = 5;
   /// @param a  in: a0, out: the minimiser
   Outcome solve(const Arm& arm, Pairs& pairs, double dt_s, Eigen::VectorXd& a) noexcept;
+  /// The same with the torque limits alone: for an arm that brakes whatever stands about it.
+  void keep_torque(const Arm& arm, Eigen::VectorXd& a) noexcept;
 
  private:
   void add_row(const Arm& arm, double b, double price) noexcept;
@@ -48,6 +50,7 @@ class Barrier {
   void add_joint_rows(const Arm& arm, double dt_s) noexcept;
   double acceleration_limit(const Arm& arm, int j) const noexcept;
   void add_torque_rows(const Arm& arm) noexcept;
+  bool settle(const Arm& arm, Eigen::VectorXd& a) noexcept;
 
   const scene::PlannerOptions& options_;
   LeastNorm least_norm_;

@@ -91,7 +91,9 @@ bool in_reach(const Workspace& workspace, const geometry::Obstacle& o,
   sphere.bound_m = workspace.radius_m;
   const double distance = geometry::distance_bound(sphere, geometry::solid(o.shape, o.X_WO));
   const double speed = o.velocity_known ? o.V_WO.tail<3>().norm() : kFastest_mps;
-  const double felt = options.rho0_m + 2 * std::max(o.sigma_m, 0.0) + speed * options.stale_brake_s;
+  const double most_s = options.stale_brake_s;
+  const double felt = options.rho0_m + 2 * std::max(o.sigma_m, 0.0) + speed * most_s +
+                      0.5 * options.assumed_acceleration_mps2 * most_s * most_s;
   return !(distance > std::max(felt, kSeen_m));
 }
 
@@ -126,7 +128,7 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
   age_s_ = age;
   for (const std::size_t k : near_) {
     const geometry::Obstacle& s = stamped[k];
-    Item item{s, {}, 2 * std::max(s.sigma_m, 0.0), k};
+    Item item{s, {}, 2 * std::max(s.sigma_m, 0.0) + 0.5 * o.assumed_acceleration_mps2 * age * age, k};
     if (!s.velocity_known) {
       item.now.V_WO.setZero();
       Vector3d velocity;
@@ -138,7 +140,8 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
         ++unknown_;
       }
     }
-    const double grows = s.velocity_known ? 0 : o.assumed_speed_mps;
+    const double grows = (s.velocity_known ? 0 : o.assumed_speed_mps) +
+                         o.assumed_acceleration_mps2 * std::max(age, o.stale_brake_s);
     const double speed = item.now.V_WO.tail<3>().norm() + grows;
     fastest_mps_ = item.now.V_WO.head<3>().isZero(0) ? std::max(fastest_mps_, speed) : scene::kInf;
     item.now.X_WO = lie::moved(item.now.X_WO, item.now.V_WO, age);

@@ -44,7 +44,7 @@ class Obstacles {
   struct Item {
     geometry::Obstacle now;
     geometry::Solid solid{};  ///< the same, for distances
-    double inflation_m = 0;   ///< 2 sigma + assumed speed times age
+    double inflation_m = 0;   ///< 2 sigma + assumed speed times age + a/2 age^2
     std::size_t order = 0;    ///< in the input
   };
   std::span<const Item> items() const noexcept { return items_; }

@@ -114,9 +114,13 @@ Verdict Planner::Impl::see(const Input& in) noexcept {
     arm.q.setConstant(std::nan(""));
     return {State::unsafe, Reason::non_finite, "the arm's state is not finite"};
   }
-  arm.look(in.q, in.qd);
+  lag_s = in.state_age_s > std::min(2 * in.dt_s, kFresh_s) && in.state_age_s <= options.stale_state_s
+              ? in.state_age_s
+              : 0;
+  q_now = in.q + lag_s * in.qd;
+  arm.look(q_now, in.qd);
   remember_tip();
-  obstacles.take(in.obstacles, in.t_s, in.obstacle_age_s, options, memory, in.obstacle_set);
+  obstacles.take(in.obstacles, in.t_s + lag_s, in.obstacle_age_s + lag_s, options, memory, in.obstacle_set);
   pairs.find(arm, obstacles, in.link_floor_m);
   memory.clearance_min_m = std::min(memory.clearance_min_m, pairs.clearance_m());
   const bool self_contact = pairs.self_clearance_m() < 0;

@@ -37,7 +37,7 @@ enum class Reason : std::uint8_t {
   infeasible,
   non_finite,
   torque_limit,
-  driver,
+  driver,  ///< of an arm's driver that reports in the planner's place: nothing here says it
   configuration,
   internal
 };
@@ -61,7 +61,7 @@ struct Input {
   /// Changes with every new obstacle set: what is out of reach of a set is then sorted out once and not every
   /// cycle.  0: not known.  The output is the same either way.
   std::uint64_t obstacle_set = 0;
-  double state_age_s = 0;           ///< how old the arm state is
+  double state_age_s = 0;  ///< how old the arm state is: beyond two periods or 20 ms it goes on with qd
   bool obstacles_expected = false;  ///< the scene has perception: no motion before its first set
   /// For each link a distance, less inflation, that no obstacle comes under; or empty: nothing is known.  A
   /// link above rho0 is asked for distances only while its floor is below the clearance of the others; its

@@ -15,6 +15,8 @@
 namespace hamel::planner {
 
 inline constexpr double kLeastPeriod_s = 1e-6;  ///< of a command
+inline constexpr double kFresh_s =
+    0.02;  ///< a state older than this, or than two periods, is carried on to now
 inline constexpr std::uint64_t kFlips = 2;  ///< sides tried before an arm that circulates is called stuck
 
 struct Planner::Impl {
@@ -29,6 +31,7 @@ struct Planner::Impl {
         tau_att(Eigen::VectorXd::Zero(arm.n())),
         qdd_att(tau_att),
         qdd(tau_att),
+        q_now(tau_att),
         scratch(kMaxPairs) {
     waypoint.kind = scene::GoalKind::joints;
     waypoint.joints = tau_att;
@@ -45,7 +48,7 @@ struct Planner::Impl {
   double open_tank(double dt_s) noexcept;
   bool guard(const Input& in, Eigen::VectorXd& tau) noexcept;
   double braking_rate(double dt_s) const noexcept;
-  void brake(double dt_s, Eigen::VectorXd& tau) const noexcept;
+  void brake(double dt_s, Eigen::VectorXd& tau) noexcept;
   void report(const Verdict& verdict, Report& out) noexcept;
   double slow_down(const Input& in) const noexcept;
   void look_for_a_way(const scene::Goal& wanted);
@@ -68,6 +71,8 @@ struct Planner::Impl {
   Pairs pairs;
   Barrier::Outcome outcome;
   Eigen::VectorXd tau_att, qdd_att, qdd;
+  Eigen::VectorXd q_now;  // the state carried on to now
+  double lag_s = 0;       // by so much
   std::vector<HeldPair> scratch;
   scene::Goal goal, sought;                            // `sought` as it came
   scene::Goal waypoint;                                // as a goal

@@ -24,11 +24,11 @@ constexpr double kFade_s = 0.5;  // circulation comes back over it after the bar
 void Planner::Impl::prepare(const Input& in) noexcept {
   const bool ahead = options.method == Method::gyro && in.dt_s > 0 && std::isfinite(in.dt_s);
   if (ahead) {
-    qdd = in.q + 0.5 * in.dt_s * in.qd;
+    qdd = q_now + 0.5 * in.dt_s * in.qd;
     arm.update(qdd, in.qd);
     pairs.advance(arm, 0.5 * in.dt_s);
   } else {
-    arm.update(in.q, in.qd);
+    arm.update(q_now, in.qd);
   }
   pairs.complete(arm);
 }
@@ -120,8 +120,11 @@ double Planner::Impl::braking_rate(double dt_s) const noexcept {
   return std::expm1(-options.brake_rate * dt) / dt;
 }
 
-void Planner::Impl::brake(double dt_s, VectorXd& tau) const noexcept {
-  tau.noalias() = arm.M * (braking_rate(dt_s) * arm.qd);
+// As hard as the joints are strong.  What stands about the arm plays no part: it may be old, or wrong.
+void Planner::Impl::brake(double dt_s, VectorXd& tau) noexcept {
+  qdd = braking_rate(dt_s) * arm.qd;
+  barrier.keep_torque(arm, qdd);
+  tau.noalias() = arm.M * qdd;
   tau += arm.coriolis;
 }
 
