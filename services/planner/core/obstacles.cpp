@@ -140,8 +140,7 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
         ++unknown_;
       }
     }
-    const double grows = (s.velocity_known ? 0 : o.assumed_speed_mps) +
-                         o.assumed_acceleration_mps2 * std::max(age, o.stale_brake_s);
+    const double grows = (s.velocity_known ? 0 : o.assumed_speed_mps) + o.assumed_acceleration_mps2 * age;
     const double speed = item.now.V_WO.tail<3>().norm() + grows;
     fastest_mps_ = item.now.V_WO.head<3>().isZero(0) ? std::max(fastest_mps_, speed) : scene::kInf;
     item.now.X_WO = lie::moved(item.now.X_WO, item.now.V_WO, age);

@@ -55,7 +55,7 @@ class Obstacles {
   /// The number of the set taken last (0: not known) and its age.
   std::uint64_t set() const noexcept { return set_; }
   double age_s() const noexcept { return age_s_; }
-  /// No surface of items() comes nearer to anything by more than this a second while the set stays; +inf
+  /// No surface of items() has come nearer to anything by more than this a second since the set came; +inf
   /// where one turns.
   double fastest_mps() const noexcept { return fastest_mps_; }
 
