@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <random>
 
+#include "clients/hamel/bench_drawing.h"
 #include "clients/hamel/explain_cost.h"
 #include "clients/hamel/shipped.h"
 #include "clients/hamel/ticks.h"
@@ -27,23 +27,6 @@ constexpr int kCycles = 2000, kRounds = 5;
 // What was promised.
 constexpr double kThousandOfTen = 1.5, kFastestOfFull = 0.6;
 constexpr double kMedian16_us = 20, kP99Of16_us = 100, kMedian256_us = 200;
-
-/// The same numbers with every library.
-class Dice {
- public:
-  double uniform(double from, double to) {
-    return from + (to - from) * static_cast<double>(bits_()) / static_cast<double>(std::mt19937_64::max());
-  }
-  Eigen::Vector3d direction() {
-    for (;;) {
-      const Eigen::Vector3d v(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
-      if (v.norm() < 1 && v.norm() > 0.1) return v.normalized();
-    }
-  }
-
- private:
-  std::mt19937_64 bits_{1};
-};
 
 /// Distance of a sphere from the arm at its start.
 double room_m(const scene::Scene& s, const Eigen::Vector3d& p, double radius_m) {
@@ -105,7 +88,7 @@ double mean(const std::vector<double>& v) {
 
 /// Mean cycle among 1,000 obstacles, over that among the ten of them that are in reach.
 Json thousand(const scene::Scene& reach, bool moving, const trade::Watch& watch) {
-  Dice dice;
+  Dice dice(1);
   scene::Scene ten = emptied(reach);
   add_spheres(ten, dice, 10, 0.05, 0.7, 0.9);
   if (moving) ten.perception.obstacles.front().velocity_mps = {0, 0, 0.01};
@@ -122,7 +105,7 @@ Json thousand(const scene::Scene& reach, bool moving, const trade::Watch& watch)
 
 /// The cycle at full fidelity beside so many spheres within reach.
 Json cycle(const scene::Scene& reach, int spheres, const trade::Watch& watch) {
-  Dice dice;
+  Dice dice(1);
   scene::Scene s = emptied(reach);
   add_spheres(s, dice, spheres, spheres > 16 ? 0.03 : 0.06, 0.3, 0.9);
   s = as(s, scene::Fidelity::full);

@@ -85,9 +85,11 @@ Eigen::Vector3d far_end(const urdf::Link& link) {
   return end;
 }
 
+bool has_inertia(const urdf::Link& link) { return link.inertial && link.inertial->mass > 0; }
+
 /// Of the solid cylinder about the line from 0 along `axis` with the link's moment of inertia, m r^2 / 2.
 double radius_from_inertia(const urdf::Link& link, const Eigen::Vector3d& axis) {
-  if (!link.inertial || !(link.inertial->mass > 0)) return kMeshRadius_m;
+  if (!has_inertia(link)) return kMeshRadius_m;
   const urdf::Inertial& i = *link.inertial;
   Eigen::Matrix3d I;
   I << i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz;
@@ -172,10 +174,10 @@ void append_shapes(const urdf::Link& link, int carrier, const lie::Pose& X_NL, c
   if (meshes > 0 && given == sidecar.end()) {
     const bool alone = all.empty();
     if (alone) all.push_back(fitted_capsule(link));
-    warnings.push_back("link " + link.name + ": collision mesh not read; " +
-                       (alone ? said(all.back(), link.inertial && link.inertial->mass > 0)
-                              : std::string("its other shapes stand for it")) +
-                       " (give spheres in a sidecar)");
+    warnings.push_back(
+        "link " + link.name + ": collision mesh not read; " +
+        (alone ? said(all.back(), has_inertia(link)) : std::string("its other shapes stand for it")) +
+        " (give spheres in a sidecar)");
   }
   merge_capsules(all);
   if (given != sidecar.end())

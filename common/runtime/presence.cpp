@@ -1,6 +1,7 @@
 #include "common/runtime/presence.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/runtime/log.h"
 #include "common/runtime/options.h"
@@ -21,16 +22,16 @@ Presence::Presence(bus::Node& node, wire::ServiceKind kind, std::uint32_t arm)
   status_.bus = bus::to_string(node.options().vendor);
 }
 
-void Presence::hear() {
+void Presence::hear(Clock::time_point now) {
   wire::ServiceStatus s;
   while (in_.take(s)) {
     const bus::WriterId from = in_.from();
     if (from == out_.id() || s.state == wire::ServiceState::stopping) continue;
-    const std::string said = s.version + s.idl_hash;
-    const auto known = known_.find(from);
-    if (known != known_.end() && known->second == said) continue;
-    if (known_.size() >= kMostPeers) known_.clear();
-    known_[from] = said;
+    if (known_.size() >= kMostPeers && !known_.contains(from)) known_.clear();
+    Peer& peer = known_[from];
+    const std::string before = std::exchange(peer.version, s.version + s.idl_hash);
+    peer.kind = s.kind, peer.arm = s.arm, peer.detail = s.detail, peer.heard = now;
+    if (before == peer.version) continue;
     if (s.idl_hash != status_.idl_hash || s.version != status_.version) {
       strangers_ += s.idl_hash != status_.idl_hash;
       stranger_ =
@@ -47,9 +48,18 @@ void Presence::hear() {
   }
 }
 
+std::string Presence::word_of(wire::ServiceKind kind, std::uint32_t arm, Clock::time_point since) const {
+  const Peer* newest = nullptr;
+  for (const auto& [id, peer] : known_)
+    if (peer.kind == kind && peer.arm == arm && peer.heard >= since &&
+        (!newest || peer.heard > newest->heard))
+      newest = &peer;
+  return newest ? newest->detail : "";
+}
+
 void Presence::say(Clock::time_point now, Condition condition) {
   last_ = now;
-  hear();
+  hear(now);
   status_.state = condition.state == wire::ServiceState::ready && strangers_ > 0
                       ? wire::ServiceState::degraded
                       : condition.state;

@@ -28,17 +28,27 @@ class Presence {
   /// Hears the others and says `condition`, with counters of its own added.
   void say(Clock::time_point now, Condition condition);
 
+  /// The newest detail that a service of this kind and arm was heard to say at `since` or later; empty: none.
+  std::string word_of(wire::ServiceKind kind, std::uint32_t arm, Clock::time_point since) const;
+
   std::uint64_t strangers() const { return strangers_; }  ///< peers of another IDL seen so far
   std::uint64_t doubles() const { return doubles_; }      ///< others of our kind and arm seen so far
 
  private:
-  void hear();
+  struct Peer {
+    std::string version;  ///< and IDL, as said last
+    wire::ServiceKind kind{};
+    std::uint32_t arm = 0;
+    std::string detail;
+    Clock::time_point heard{};
+  };
+  void hear(Clock::time_point now);
 
   bus::Node& node_;
   wire::ServiceStatus status_;
   wire::Publisher<wire::ServiceStatus> out_;
   wire::Subscription<wire::ServiceStatus> in_;
-  std::map<bus::WriterId, std::string> known_;  ///< the version each said last
+  std::map<bus::WriterId, Peer> known_;
   std::uint64_t strangers_ = 0, doubles_ = 0;
   std::string stranger_;
   Clock::time_point last_{};

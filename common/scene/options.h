@@ -92,6 +92,10 @@ struct PlannerOptions {
   Unreachable unreachable = Unreachable::reject;
   double ramp_s = 0.2;  ///< after a restart without memory the command ramps in over it, >= 0
 };
+/// How far an obstacle may have got in `age_s` beyond where its velocity takes it [m].
+inline double accelerated_m(const PlannerOptions& o, double age_s) noexcept {
+  return 0.5 * o.assumed_acceleration_mps2 * age_s * age_s;
+}
 
 /// How much of what a scene writes is computed.
 enum class Fidelity : std::uint8_t {

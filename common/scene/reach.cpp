@@ -62,9 +62,6 @@ ReachBall target_ball(const Robot& robot, const PlannerOptions& options) {
   return ball;
 }
 
-/// What the planner inflates it by.
-double inflation_m(const geometry::Obstacle& o) { return 2 * std::max(o.sigma_m, 0.0); }
-
 double distance_m(const Vector3d& p_W, const geometry::Obstacle& o) {
   return geometry::closest({p_W, p_W, 0, 0}, o.shape, o.X_WO).distance_m;
 }
@@ -93,6 +90,10 @@ Eigen::MatrixXd levers(const Robot& robot) {
   return out;
 }
 
+double Reach::inflation_m(const geometry::Obstacle& o) const noexcept {
+  return 2 * std::max(o.sigma_m, 0.0) + accelerated_m_;
+}
+
 bool Reach::is_plain(const geometry::Obstacle& o) {
   return o.X_WO.p.allFinite() && o.X_WO.R.allFinite() && o.shape.dims_m.allFinite() &&
          (o.shape.dims_m.array() >= 0).all() && std::isfinite(o.sigma_m) && o.velocity_known &&
@@ -112,8 +113,7 @@ Reach::Reach(const Robot& robot, const PlannerOptions& options)
       lever_m_(levers(robot).rowwise().maxCoeff()),
       rho0_m_(options.rho0_m),
       margin_m_(options.barrier_gain > 0 ? options.dmin_m : 0),
-      accelerates_m_(0.5 * options.assumed_acceleration_mps2 * options.stale_brake_s *
-                     options.stale_brake_s) {
+      accelerated_m_(accelerated_m(options, options.stale_brake_s)) {
   for (const LinkShape& s : robot.shapes) {
     const geometry::Capsule c = s.X_LS * geometry::enclosing_capsule(s.shape);
     bodies_.push_back({part_of(s), geometry::solid(s.shape, s.X_LS)});
@@ -169,7 +169,7 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
       const geometry::Solid there = geometry::solid(set[k].shape, set[k].X_WO);
       double& near = near_m_[k * m + b];
       near = geometry::distance_bound(solid_W, there);
-      const double grown = inflation_m(set[k]) + accelerates_m_;
+      const double grown = inflation_m(set[k]);
       if (near > std::max(rho0_m_ + grown, nearest_m_[link]) + 2 * kNear_m + kSlack_m) continue;
       near = geometry::closest(solid_W, there).distance_m;
       nearest_m_[link] = std::min(nearest_m_[link], near);
@@ -177,7 +177,7 @@ void Reach::sift_near(const Eigen::VectorXd& q, std::span<const geometry::Obstac
   }
   kept.clear();
   for (std::size_t k = 0; k < set.size(); ++k) {
-    const double grown = inflation_m(set[k]) + accelerates_m_;
+    const double grown = inflation_m(set[k]);
     bool matters = !stands(set[k]) || may_cover_target(distance_m(target_.centre_W, set[k]), kSlack_m, grown);
     for (std::size_t b = 0; b < m && !matters; ++b) {
       if (bodies_[b].link == -1) continue;
@@ -206,7 +206,7 @@ void Reach::sift_roughly(std::span<const geometry::Obstacle> set, double horizon
   }
   for (std::size_t k = 0; k < set.size(); ++k) {
     const geometry::Obstacle& o = set[k];
-    const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o) + accelerates_m_;
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o);
     bool far = is_plain(o) && !may_cover_target(distance_bound_m(target_.centre_W, o), way, grown);
     for (std::size_t c = 0; c < m && far; ++c) {
       const double least = near_m_[k * m + c];
@@ -235,7 +235,7 @@ void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
   for (std::size_t k = 0; k < left_.size(); ++k) {
     const geometry::Obstacle& o = set[left_[k]];
     const bool plain = is_plain(o);
-    const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o) + accelerates_m_;
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o);
     for (std::size_t c = 0; c < m && plain; ++c) near_m_[k * m + c] = distance_m(centres_[c].p_W, o);
     for (std::size_t b = 0; b < balls_.size(); ++b) {
       const ReachBall& ball = balls_[b];
@@ -250,7 +250,7 @@ void Reach::sift(std::span<const geometry::Obstacle> set, double horizon_s,
   floor_m.resize(n);
   for (std::size_t k = 0; k < left_.size(); ++k) {
     const geometry::Obstacle& o = set[left_[k]];
-    const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o) + accelerates_m_;
+    const double way = spread_m(o, horizon_s) + kSlack_m, grown = inflation_m(o);
     bool matters = !is_plain(o) || may_cover_target(distance_m(target_.centre_W, o), way, grown);
     for (std::size_t b = 0; b < balls_.size() && !matters; ++b) {
       const ReachBall& ball = balls_[b];

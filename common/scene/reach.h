@@ -85,6 +85,8 @@ class Reach {
   }
   void sift_roughly(std::span<const geometry::Obstacle> set, double horizon_s, std::vector<double>& floor_m);
   double spread_m(const geometry::Obstacle& o, double horizon_s) const noexcept;
+  /// What the planner inflates it by at most.
+  double inflation_m(const geometry::Obstacle& o) const noexcept;
   bool may_cover_target(double distance_m, double way_m, double grown_m) const noexcept;
 
   std::vector<ReachBall> balls_;
@@ -98,7 +100,7 @@ class Reach {
   std::vector<double> near_m_, nearest_m_;  ///< scratch: distances of obstacles, and the least
   std::vector<std::size_t> left_;           ///< scratch: what sift_roughly() leaves
   double rho0_m_ = 0, margin_m_ = 0;
-  double accelerates_m_ = 0;  ///< what assumed acceleration adds to an obstacle before it is too old
+  double accelerated_m_ = 0;  ///< accelerated_m() of an obstacle that is almost too old
 };
 
 }  // namespace hamel::scene

@@ -78,7 +78,6 @@ DynamicsService::DynamicsService(bus::Node& node, const scene::Scene& scene, con
       command_in_(node),
       mode_in_(node),
       clock_in_(node),
-      status_in_(node),
       presence_(node, wire::ServiceKind::dynamics, scene.arm) {
   const double dt = scene.dynamics.dt_s;
   last_step_ = static_cast<std::uint64_t>(std::llround(scene.duration_s / dt));
@@ -155,7 +154,6 @@ bool DynamicsService::poll_lockstep(Time now) {
     progressed = true;
   }
   if (progressed) return true;
-  hear_planner(now);
   if (now - waiting_since_ > 1s && refusals_(now))
     spdlog::warn("step {} waits for the planner of arm {}, {:.0f} s so far{}", arm_.state().step, scene_.arm,
                  std::chrono::duration<double>(now - waiting_since_).count(), planner_waits());
@@ -173,19 +171,10 @@ bool DynamicsService::poll_lockstep(Time now) {
   return false;
 }
 
-/// What the planner of this arm says that it waits for: a status it has twice a second.
-void DynamicsService::hear_planner(Time now) {
-  wire::ServiceStatus s;
-  for (int i = 0; i < kBurst && status_in_.take(s); ++i) {
-    if (s.kind != wire::ServiceKind::planner || s.arm != scene_.arm) continue;
-    planner_says_ = s.detail;
-    planner_said_ = now;
-  }
-}
-
+/// What the planner of this arm says that it waits for, where it says so.
 std::string DynamicsService::planner_waits() const {
-  if (planner_said_ < waiting_since_ + 1s || planner_says_.find("waits for") == std::string::npos) return "";
-  return "; it says: " + planner_says_;
+  const std::string word = presence_.word_of(wire::ServiceKind::planner, scene_.arm, waiting_since_ + 1s);
+  return word.find("waits for") == std::string::npos ? "" : "; it says: " + word;
 }
 
 bool DynamicsService::poll_realtime(Time now) {

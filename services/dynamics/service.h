@@ -58,7 +58,6 @@ class DynamicsService final : public runtime::Service {
   std::int64_t ramp_steps() const;
   bool poll_lockstep(Time now);
   std::string planner_waits() const;
-  void hear_planner(Time now);
   bool poll_realtime(Time now);
   void count_lateness(Time now);
   bool owner_is_silent() const;
@@ -93,7 +92,6 @@ class DynamicsService final : public runtime::Service {
   wire::Subscription<wire::TorqueCommand> command_in_;
   wire::Subscription<wire::ModeCommand> mode_in_;
   wire::Subscription<wire::SimulationClock> clock_in_;
-  wire::Subscription<wire::ServiceStatus> status_in_;
   runtime::Presence presence_;
 
   wire::ArmState state_;
@@ -102,8 +100,6 @@ class DynamicsService final : public runtime::Service {
   std::optional<std::uint64_t> command_step_;  ///< the state step it answers; none: no command yet
   bool command_includes_gravity_ = false;
   wire::PlannerState planner_state_ = wire::PlannerState::idle;
-  std::string planner_says_;  ///< lockstep: the detail of its newest status
-  Time planner_said_{};
   std::uint64_t epoch_ = 0;
   bus::WriterId owner_{};  ///< of the planner that drives the arm
   /// The step at which its ramp out of a hold began; a run's first command has its ramp behind it.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "common/rbd/rbd.h"
@@ -28,6 +29,20 @@ class Robustness : public test::ForSeed {
   const int n = 1 + static_cast<int>(GetParam() % 7);
   const model::Chain chain = test::random_chain(rng, n, {.damping = 0.3});
   const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 1), tau = rng.vector(n, 1);
+
+  struct Pushed {
+    bool flat;
+    model::Chain arm;
+    lie::Wrench push;
+  };
+  /// Every other one planar, with a wrench for its last link.
+  Pushed pushed_arm() {
+    const bool flat = GetParam() % 2 == 1;
+    model::Chain arm = flat ? test::checked(test::random_planar_spec(rng, n, {.damping = 0.3})) : chain;
+    lie::Wrench push;
+    push << rng.vec3(1), rng.vec3(1);
+    return {flat, std::move(arm), push};
+  }
 };
 INSTANTIATE_TEST_SUITE_P(Property, Robustness, testing::Range(0u, 14u));
 
@@ -49,10 +64,7 @@ std::vector<Options> everything() {
 
 // 2N steps are N, save, load, N more, in another integrator.
 TEST_P(Robustness, ResumesBitForBit) {
-  const bool flat = GetParam() % 2 == 1;
-  const model::Chain arm = flat ? test::checked(test::random_planar_spec(rng, n, {.damping = 0.3})) : chain;
-  lie::Wrench push;
-  push << rng.vec3(1), rng.vec3(1);
+  const auto [flat, arm, push] = pushed_arm();
   for (Options options : everything()) {
     if (!flat && options.space == Space::se3) continue;  // the same arm once more
     for (const double dt_s : {1e-3, 0.05}) {             // the longer one is divided now and then
@@ -86,10 +98,7 @@ TEST_P(Robustness, ServesManyStatesInTurn) {
 
 TEST_P(Robustness, AllocatesNothingInAStep) {
   if (!test::NoAlloc::supported()) GTEST_SKIP();
-  const bool flat = GetParam() % 2 == 1;
-  const model::Chain arm = flat ? test::checked(test::random_planar_spec(rng, n, {.damping = 0.3})) : chain;
-  lie::Wrench push;
-  push << rng.vec3(1), rng.vec3(1);
+  const auto [flat, arm, push] = pushed_arm();
   for (Options options : everything()) {
     if (!flat && options.space == Space::se3) continue;  // the same arm once more
     for (const double dt_s : {1e-3, 0.3}) {              // the longer one is divided, or refused

@@ -92,8 +92,8 @@ bool in_reach(const Workspace& workspace, const geometry::Obstacle& o,
   const double distance = geometry::distance_bound(sphere, geometry::solid(o.shape, o.X_WO));
   const double speed = o.velocity_known ? o.V_WO.tail<3>().norm() : kFastest_mps;
   const double most_s = options.stale_brake_s;
-  const double felt = options.rho0_m + 2 * std::max(o.sigma_m, 0.0) + speed * most_s +
-                      0.5 * options.assumed_acceleration_mps2 * most_s * most_s;
+  const double felt =
+      options.rho0_m + 2 * std::max(o.sigma_m, 0.0) + speed * most_s + accelerated_m(options, most_s);
   return !(distance > std::max(felt, kSeen_m));
 }
 
@@ -128,7 +128,7 @@ void Obstacles::take(std::span<const geometry::Obstacle> stamped, double t_s, do
   age_s_ = age;
   for (const std::size_t k : near_) {
     const geometry::Obstacle& s = stamped[k];
-    Item item{s, {}, 2 * std::max(s.sigma_m, 0.0) + 0.5 * o.assumed_acceleration_mps2 * age * age, k};
+    Item item{s, {}, 2 * std::max(s.sigma_m, 0.0) + accelerated_m(o, age), k};
     if (!s.velocity_known) {
       item.now.V_WO.setZero();
       Vector3d velocity;
