@@ -292,22 +292,21 @@ void DynamicsService::publish_summary(bool final_summary) {
   summary_out_.publish(s);
 }
 
-void DynamicsService::publish_status(wire::ServiceState state) {
-  presence_.say(runtime::Clock::now(),
-                {.state = state,
-                 .incarnation = incarnation_,
-                 .detail = finished() ? to_string(outcome_) : wire::to_string(validity_),
-                 .counters = {{"steps", arm_.state().step},
-                              {"outages", outages_},
-                              {"commands_refused", commands_refused_},
-                              {"commands_missed", commands_missed_},
-                              {"deadlines_missed", deadlines_missed_},
-                              {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}}});
+void DynamicsService::publish_status(Time now, wire::ServiceState state) {
+  presence_.say(now, {.state = state,
+                      .incarnation = incarnation_,
+                      .detail = finished() ? to_string(outcome_) : wire::to_string(validity_),
+                      .counters = {{"steps", arm_.state().step},
+                                   {"outages", outages_},
+                                   {"commands_refused", commands_refused_},
+                                   {"commands_missed", commands_missed_},
+                                   {"deadlines_missed", deadlines_missed_},
+                                   {"undecodable", command_in_.undecodable() + mode_in_.undecodable()}}});
 }
 
 void DynamicsService::publish_periodic(Time now) {
   if (presence_.due(now)) {
-    publish_status(wire::ServiceState::ready);
+    publish_status(now, wire::ServiceState::ready);
     publish_summary(finished());
   }
   if (checkpoint_) checkpoint_->sync(now);
@@ -328,7 +327,7 @@ void DynamicsService::close() {
   if (outcome_ == Outcome::not_alone) return;
   publish_clock(false);
   publish_summary(true);
-  publish_status(wire::ServiceState::stopping);
+  publish_status(runtime::Clock::now(), wire::ServiceState::stopping);
 }
 
 }  // namespace hamel::dynamics

@@ -70,7 +70,7 @@ class DynamicsService final : public runtime::Service {
   void publish_state();
   void publish_clock(bool running);
   void publish_summary(bool final_summary);
-  void publish_status(wire::ServiceState state);
+  void publish_status(Time now, wire::ServiceState state);
   void publish_periodic(Time now);
   void end(Outcome outcome, const std::string& why);
   Result<std::unique_ptr<runtime::Checkpoint>, Problem> open_checkpoint();
