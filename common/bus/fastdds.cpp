@@ -68,12 +68,16 @@ void promise(Qos& qos, const Topic& topic, std::chrono::milliseconds more = {}) 
   qos.liveliness().announcement_period = duration(kAlive / 3);
 }
 
-/// A stranger's samples of a key too many are refused, again and again, until an instance goes with its last
-/// writer: that holds up the stranger only.
+/// Instances that Fast DDS is let keep, of which a reader hears kMaxInstances.  Where there are no more to be
+/// had, 2.9 makes room by dropping one of which nothing waits, and ends the program (an assertion of its own)
+/// when a sample of that one is on its way: so many that no peer comes there by mistake, and what a hostile
+/// one can fill with them is tens of megabytes.
+constexpr int kVendorInstances = 1 << 16;
+
 dds::DataReaderQos reader_qos(const Topic& topic, int depth, Ask ask) {
   auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
-  qos.resource_limits().max_instances = kMaxInstances;
-  qos.resource_limits().max_samples = kMaxInstances * qos.history().depth;
+  qos.resource_limits().max_instances = kVendorInstances;
+  qos.resource_limits().max_samples = kVendorInstances * qos.history().depth;
   if (ask == Ask::promises) promise(qos, topic, kRounding);
   return qos;
 }
@@ -121,8 +125,9 @@ class FastWriter final : public Writer {
 
 class FastReader final : public Reader {
  public:
-  FastReader(const Topic& topic, dds::Subscriber& subscriber, dds::DataReader& reader, ReaderEvents& events)
-      : topic_(topic), subscriber_(subscriber), reader_(reader), events_(events) {}
+  FastReader(const Topic& topic, dds::Subscriber& subscriber, dds::DataReader& reader, ReaderEvents& events,
+             const Neighbours& neighbours)
+      : topic_(topic), subscriber_(subscriber), reader_(reader), events_(events), neighbours_(neighbours) {}
   ~FastReader() override {
     reader_.set_listener(nullptr);
     subscriber_.delete_datareader(&reader_);
@@ -139,6 +144,10 @@ class FastReader final : public Reader {
         continue;
       }
       from_ = info.sample_identity.writer_guid();
+      if (topic_.keyed && !hears(info.instance_handle)) {
+        ++passed_over_;
+        continue;
+      }
       const bool good = sample.size == payload.size() && acceptable(payload, topic_);
       ++(good ? samples_ : refused_);
       if (!good) continue;
@@ -150,15 +159,34 @@ class FastReader final : public Reader {
   }
   WriterId from() const override { return id_of(from_); }
   int matched() const override { return events_.matched; }
-  Counters counters() const override { return events_.counters(samples_, refused_, disposed_); }
+  Counters counters() const override {
+    Counters c = events_.counters(samples_, refused_, disposed_);
+    c.lost += passed_over_;
+    return c;
+  }
 
  private:
+  /// Keys are heard as they come, up to kMaxInstances.  They make room when their writers have gone, which is
+  /// looked at once for so many samples that are passed over: Fast DDS says nothing of an instance of which
+  /// nothing waits.
+  bool hears(const dds::InstanceHandle_t& key) {
+    if (const auto known = heard_.find(key); known != heard_.end()) {
+      known->second = from_;
+      return true;
+    }
+    if (heard_.size() >= kMaxInstances && passed_over_ % kMaxInstances == 0)
+      std::erase_if(heard_, [this](const auto& k) { return !neighbours_.know(k.second); });
+    return heard_.size() < kMaxInstances && heard_.emplace(key, from_).second;
+  }
+
   const Topic& topic_;
   dds::Subscriber& subscriber_;
   dds::DataReader& reader_;
   ReaderEvents& events_;
+  const Neighbours& neighbours_;
   rtps::GUID_t from_;
-  std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0;
+  std::map<dds::InstanceHandle_t, rtps::GUID_t> heard_;  ///< and who wrote each last
+  std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0, passed_over_ = 0;
 };
 
 template <class T>
@@ -231,7 +259,7 @@ class FastNode final : public Node {
     auto& made =
         checked(subscriber_->create_datareader(&topic_for(topic), reader_qos(topic, depth, ask), &events),
                 "reader", topic);
-    return std::make_unique<FastReader>(topic, *subscriber_, made, events);
+    return std::make_unique<FastReader>(topic, *subscriber_, made, events, neighbours_);
   }
 
   std::vector<Endpoint> endpoints() override { return neighbours_.all(); }

@@ -84,6 +84,10 @@ class Neighbours final : public dds::DomainParticipantListener {
   void on_subscriber_discovery(dds::DomainParticipant*, rtps::ReaderDiscoveryInfo&& found) override {
     keep(found.info, found.status == rtps::ReaderDiscoveryInfo::REMOVED_READER, false);
   }
+  bool know(const rtps::GUID_t& end) const {
+    const std::lock_guard lock(mutex_);
+    return ends_.contains(end) && names_.contains(end.guidPrefix);
+  }
   std::vector<Endpoint> all() const {
     const std::lock_guard lock(mutex_);
     std::vector<Endpoint> known;
