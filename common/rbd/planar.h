@@ -5,6 +5,8 @@
 /// configuration, after which twists and wrenches pass from link to link by a translation alone.  What turns
 /// is in the frame: offset, first moment, prismatic axis.
 
+#include <cmath>
+
 #include "common/lie/pack.h"
 #include "common/rbd/planar_chain.h"
 
@@ -37,6 +39,7 @@ struct PlanarArticulated {
 struct NoAttitude {};
 
 struct SE2 {
+  static constexpr bool kPlanar = true;
   using Chain = PlanarChain;
   using Link = PlanarLink;
   template <class S>
@@ -91,8 +94,25 @@ template <class S>
   }
 }
 
-/// All frames at q: angles add up along the chain, and each is turned into one sine and cosine.  A frame
-/// keeps its angle in c until then, so that numbers alone may be turned two at a time.
+/// Turns vectors by one angle; numbers alone both components at a time.
+template <class S>
+struct Turn {
+  S c, s;
+  [[gnu::always_inline]] Vec2<S> operator()(const Vec2<double>& v) const { return rotate(c, s, v); }
+};
+template <>
+struct Turn<double> {
+  using Pair = lie::Pack<2, lie::Baseline>;
+  Pair c, s;
+  [[gnu::always_inline]] Turn(double cosine, double sine) : c{{cosine, cosine}}, s{{-sine, sine}} {}
+  [[gnu::always_inline]] Vec2<double> operator()(const Vec2<double>& v) const {
+    const Pair turned = c * Pair{{v.x, v.y}} + s * Pair{{v.y, v.x}};
+    return {turned.v[0], turned.v[1]};
+  }
+};
+
+/// Sines and cosines of all links, whose frames keep their angles in c until then: numbers alone are turned
+/// two at a time.
 template <class S>
 [[gnu::always_inline]] inline void turn_all(int n, PlanarFrame<S>* X) noexcept {
   for (int i = 0; i < n; ++i) lie::sincos(S(X[i].c), X[i].s, X[i].c);
@@ -106,6 +126,20 @@ template <class S>
     x.c = c.v[0], x.s = s.v[0], y.c = c.v[1], y.s = s.v[1];
   }
 }
+/// What sine and cosine of a link turn: its own first moment and the way to the next origin.
+template <class S>
+[[gnu::always_inline]] inline void put_together(const PlanarChain& chain, const S* q,
+                                                PlanarFrame<S>* X) noexcept {
+  Turn<S> turn{S{} + 1.0, S{}};
+  for (int i = 0; i < chain.n(); ++i) {
+    const PlanarLink& k = chain[i];
+    X[i].p = turn(k.p_PJ);
+    if (k.prismatic) X[i].p = X[i].p + q[i] * turn(k.axis);
+    turn = Turn<S>{X[i].c, X[i].s};
+    X[i].h = turn(k.h);
+  }
+}
+/// All frames at q: angles add up along the chain, and each is turned into one sine and cosine.
 template <class S>
 [[gnu::always_inline]] inline void place(const PlanarChain& chain, const S* q, PlanarFrame<S>* X) noexcept {
   S angle{};
@@ -114,14 +148,26 @@ template <class S>
     X[i].c = angle;
   }
   turn_all(chain.n(), X);
-  S c = S{} + 1.0, s{};
+  put_together(chain, q, X);
+}
+/// Angles that turn_on() takes on by their series: what it leaves out is below angle^4 / 24 = 5e-18 [rad].
+inline constexpr double kTurnOn = 1e-4;
+/// All frames at q from those where joint i was at q_i - change(i), at a fraction of the cost of place().
+/// False, and X means nothing, where the links' turns add up to kTurnOn or more.
+template <class Change>
+[[gnu::always_inline]] inline bool turn_on(const PlanarChain& chain, const double* q, const Change& change,
+                                           PlanarFrame<double>* X) noexcept {
+  double angle = 0, sum = 0;
   for (int i = 0; i < chain.n(); ++i) {
-    const PlanarLink& k = chain[i];
-    X[i].p = rotate(c, s, k.p_PJ);
-    if (k.prismatic) X[i].p = X[i].p + q[i] * rotate(c, s, k.axis);
-    c = X[i].c, s = X[i].s;
-    X[i].h = rotate(c, s, k.h);
+    if (!chain[i].prismatic) angle += chain[i].sign * change(i);
+    sum += std::abs(angle);
+    const double c = X[i].c, s = X[i].s, half = 0.5 * angle, third = (1.0 / 3) * angle;
+    X[i].c = c - angle * (s + half * (c - third * s));
+    X[i].s = s + angle * (c - half * (s + third * c));
   }
+  if (!(sum < kTurnOn)) return false;
+  put_together(chain, q, X);
+  return true;
 }
 
 template <class S>

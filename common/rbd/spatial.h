@@ -36,6 +36,7 @@ struct Articulated {
 
 /// What the recursions are written over.
 struct SE3 {
+  static constexpr bool kPlanar = false;
   using Chain = AxisChain;
   using Link = AxisLink;
   template <class S>

@@ -64,28 +64,35 @@ struct Inward {
     if (i > 0) p = to_parent(X[i], p) + y * f[i].W;
   }
 };
-/// The way back: x from u.
-template <class G, class S>
+/// A put() for solve() that writes to x.
+template <class S>
+[[gnu::always_inline]] inline auto into(S* x) {
+  return [x](int i, const S& x_i) { x[i] = x_i; };
+}
+/// The way back: calls put(i, x_i), from the base.
+template <class G, class S, class Put>
 [[gnu::always_inline]] inline void solve_outward(const typename G::Chain& chain,
                                                  const typename G::template Frame<S>* X,
-                                                 const Factor<G, S>* f, const S* u, S* x) noexcept {
+                                                 const Factor<G, S>* f, const S* u, const Put& put) noexcept {
   typename G::template Motion<S> a{};
   for (int i = 0; i < chain.n(); ++i) {
-    x[i] = i > 0 ? u[i] - dot(f[i].W, a) : u[i];
+    const S x = i > 0 ? u[i] - dot(f[i].W, a) : u[i];
+    put(i, x);
     if (i > 0) a = to_child(X[i], a);
-    add_along(chain[i], X[i], a, x[i]);
+    add_along(chain[i], X[i], a, x);
   }
 }
 /// x = (M + diag(extra))^-1 (b - A^T W) from the factorisation, O(n), where W_i is the sum of the wrenches
-/// `wrench` of link i and all beyond it (null: none).  x and b may be the same; `u` is scratch.
-template <class G, class S>
+/// `wrench` of link i and all beyond it (null: none).  Calls put(i, x_i), from the base, when b is no longer
+/// read; `u` is scratch.
+template <class G, class S, class Put>
 [[gnu::always_inline]] inline void solve(const typename G::Chain& chain,
                                          const typename G::template Frame<S>* X, const Factor<G, S>* f,
-                                         const S* b, S* u, S* x,
+                                         const S* b, S* u, const Put& put,
                                          const typename G::template Motion<S>* wrench = nullptr) noexcept {
   Inward<G, S> inward{chain, X, f, b, u, wrench};
   for (int i = chain.n(); i-- > 0;) inward(i);
-  solve_outward<G, S>(chain, X, f, u, x);
+  solve_outward<G, S>(chain, X, f, u, put);
 }
 
 /// factorise() and solve() in one pass from the tip: pays where registers are wide and links few.
@@ -95,7 +102,7 @@ template <class G, class S>
                                                        Factor<G, S>* f, const S* b, S* u, S* x) noexcept {
   Inward<G, S> inward{chain, X, f, b, u};
   factorise<G, S>(chain, X, nullptr, f, [&](int i) { inward(i); });
-  solve_outward<G, S>(chain, X, f, u, x);
+  solve_outward<G, S>(chain, X, f, u, into(x));
 }
 
 /// Twists (5) and the wrenches F that the motion and gravity ask for, base to tip, Eq. (8): I a - ad_V^T I V.
@@ -150,7 +157,7 @@ void forward_dynamics(const typename G::Chain& chain, const double* q, const dou
   motion_wrenches<G, double>(chain, qd, nullptr, w.X.data(), w.F.data());
   for (int i = 0; i < chain.n(); ++i) qdd[i] = tau[i] - chain[i].damping * qd[i];
   factorise<G, double>(chain, w.X.data(), nullptr, w.factor.data());
-  solve<G, double>(chain, w.X.data(), w.factor.data(), qdd, w.u.data(), qdd, w.F.data());
+  solve<G, double>(chain, w.X.data(), w.factor.data(), qdd, w.u.data(), into(qdd), w.F.data());
 }
 /// tau = M qdd + c + tau_g, O(n).  tau may be qdd.
 template <class G>

@@ -66,7 +66,7 @@ TEST_P(SpuriousRoot, IsWhereTheIterationAloneEnds) {
   from.history.assign(step.history_size(), 0), to.history = from.history;
   from.place(planar, q);
   from.move_with_velocity(planar, qd);
-  from.move_with_momentum(planar, VectorXd(from.p));
+  from.move_with_momentum(planar);
   const StepReport report = step.advance(from, Load<SE2>(3), row.dt_s, to);
   ASSERT_TRUE(report.usable());
   EXPECT_LT(report.residual_Nm, 1e-8) << "a root it is";

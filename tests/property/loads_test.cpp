@@ -163,7 +163,7 @@ void expect_same_bits(const typename G::Chain& chain, int stages, const VectorXd
   Node<G> from(chain), first(chain), other(chain);
   from.place(chain, q);
   from.move_with_velocity(chain, qd);
-  from.move_with_momentum(chain, VectorXd(from.p));
+  from.move_with_momentum(chain);
   for (const Lanes lanes : {Lanes::baseline, Lanes::avx2, Lanes::avx512}) {
     if (!stage_kernel<G>(lanes)) continue;
     GaussStep<G> step(chain, options, lanes);

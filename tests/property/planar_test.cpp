@@ -1,7 +1,10 @@
 // A planar arm on SE(2) is the same arm on SE(3): every tier, every root, every load, to rounding.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "common/rbd/rbd.h"
 #include "services/dynamics/core/integrator.h"
@@ -13,6 +16,15 @@ namespace hamel::dynamics {
 namespace {
 
 using Eigen::VectorXd;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+/// Turns that add up along the chain.
+VectorXd arm_signs(const rbd::PlanarChain& arm) {
+  VectorXd signs(arm.n());
+  for (int i = 0; i < arm.n(); ++i) signs[i] = arm[i].sign;
+  return signs;
+}
 
 class Planar : public test::ForSeed {
  protected:
@@ -100,6 +112,56 @@ TEST_P(Planar, JacobianIsTheSlopeOfTheResidual) {
   VectorXd back(n);
   step.solve_linear(slope, back);
   EXPECT_LT((back - x).norm(), 1e-6 * x.norm());
+}
+
+TEST_P(Planar, TurnsOnAsItIsPlaced) {
+  const rbd::PlanarChain arm(chain);
+  std::vector<rbd::PlanarFrame<double>> X(static_cast<std::size_t>(n)), Y = X;
+  for (const double size : {1e-3, 0.1, 0.99, 1.01}) {  // of the bound; a link's turn is n joints' at most
+    const VectorXd change =
+        VectorXd::Constant(n, size * rbd::kTurnOn / (0.5 * n * (n + 1))).cwiseProduct(arm_signs(arm));
+    const auto by = [&](int i) { return change[i]; };
+    rbd::place(arm, VectorXd(q - change).eval().data(), X.data());
+    rbd::place(arm, q.data(), Y.data());
+    const bool all_turn =
+        std::all_of(arm.links.begin(), arm.links.end(), [](const auto& k) { return !k.prismatic; });
+    const bool near = rbd::turn_on(arm, q.data(), by, X.data());
+    if (size < 1 || all_turn) {
+      EXPECT_EQ(near, size < 1) << size;
+    }
+    if (!near) continue;
+    for (std::size_t i = 0; i < X.size(); ++i) {
+      const rbd::PlanarLink& k = arm.links[i];
+      const double reach = std::hypot(k.p_PJ.x, k.p_PJ.y) + std::abs(q[static_cast<Eigen::Index>(i)]);
+      const double moment = std::hypot(k.h.x, k.h.y);
+      EXPECT_LT(std::hypot(X[i].c - Y[i].c, X[i].s - Y[i].s), 4 * kEps * (1 + q.lpNorm<1>()));
+      EXPECT_LT(std::hypot(X[i].p.x - Y[i].p.x, X[i].p.y - Y[i].p.y),
+                8 * kEps * (1 + q.lpNorm<1>()) * reach + 1e-300);
+      EXPECT_LT(std::hypot(X[i].h.x - Y[i].h.x, X[i].h.y - Y[i].h.y),
+                8 * kEps * (1 + q.lpNorm<1>()) * moment + 1e-300);
+    }
+  }
+}
+
+TEST_P(Planar, ResidualDoesNotDependOnTheOneBefore) {
+  const rbd::PlanarChain arm(chain);
+  const double h = 1e-2;
+  MidpointStep<SE2> first(arm, {.dt_s = h}), second(arm, {.dt_s = h});
+  Node<SE2> from(arm);
+  from.place(arm, q);
+  from.move_with_velocity(arm, qd);
+  from.history.assign(first.history_size(), 0);
+  const Load<SE2> load(n);
+  first.begin(from, load, h), second.begin(from, load, h);
+  const VectorXd d = h * qd;
+  for (const double apart : {1e-9, 1e-6, 1e-4, 1.0}) {  // near enough to turn on, and not
+    first.evaluate(d + rng.vector(n, apart));
+    first.evaluate(d);
+    second.begin(from, load, h);
+    second.evaluate(d);
+    const double size = second.residual().norm() + from.p.norm();
+    EXPECT_LT((first.residual() - second.residual()).norm(), 1e-13 * size) << apart;
+  }
 }
 
 TEST_P(Planar, IsSeenByItsAxesAlone) {

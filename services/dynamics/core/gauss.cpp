@@ -142,7 +142,8 @@ StepReport GaussStep<G>::advance(const Node<G>& from, const Load<G>& load, doubl
   }
   remember(x_, to);
   to.place(chain_, u_);
-  to.move_with_momentum(chain_, p_next_);
+  to.p = p_next_;
+  to.move_with_momentum(chain_);
   return report;
 }
 

@@ -77,7 +77,7 @@ void StiffForces<G>::correct(const MatrixXd& F, MatrixXd& F_next, MatrixXd& V_ne
       y_[at(i)] = 0;
       for (Eigen::Index j = 0; j < stages_; ++j) y_[at(i)] += mode.to[at(j)] * change_(j, i);
     }
-    rbd::solve<G, Complex>(chain_, X_.data(), mode.factor.data(), y_.data(), u_.data(), y_.data());
+    rbd::solve<G, Complex>(chain_, X_.data(), mode.factor.data(), y_.data(), u_.data(), rbd::into(y_.data()));
     for (Eigen::Index i = 0; i < n; ++i) {
       const Complex force = mode.weight * mode.E[at(i)] * y_[at(i)],
                     rate = mode.weight * h_ * mode.lambda * y_[at(i)];

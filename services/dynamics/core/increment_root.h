@@ -47,8 +47,11 @@ class IncrementHistory {
     for (Eigen::Index i = 0; i < n; i += 2, block += kBlock) {
       Pair sum = Pair::load(block);
       for (int order = 1; order < orders; ++order) sum += Pair::load(block + 2 * order);
-      d[i] = sum.v[0];
-      if (i + 1 < n) d[i + 1] = sum.v[1];
+      if (i + 1 < n) {
+        sum.store(d + i);
+      } else {
+        d[i] = sum.v[0];
+      }
     }
   }
   template <class G>
@@ -83,8 +86,11 @@ class IncrementHistory {
   /// in the differences.
   static int falling(const double* block, Eigen::Index n, int count) noexcept {
     std::array<Pair, kDepth> sizes;
-    for (Eigen::Index i = 0; i < n; i += 2, block += kBlock)
+    for (int order = 0; order < kDepth; ++order) sizes[at(order)] = abs(Pair::load(block + 2 * order));
+    for (Eigen::Index i = 2; i < n; i += 2) {
+      block += kBlock;
       for (int order = 0; order < kDepth; ++order) sizes[at(order)] += abs(Pair::load(block + 2 * order));
+    }
     const auto size = [&](int order) { return sizes[at(order)].v[0] + sizes[at(order)].v[1]; };
     const double fall = count < kDepth ? 0.5 : 1;
     int orders = 1;

@@ -85,7 +85,12 @@ class Arm final : public Integrator::Impl {
  public:
   Arm(const model::Chain& c, const Options& o)
       : Impl(c, o), axis_(c), load_(axis_.n()), marcher_(axis_, options, make_tier<G>(axis_, options)) {
-    for (int i = 0; i < axis_.n(); ++i) limits_.push_back(chain.joint(i).limits);
+    for (int i = 0; i < axis_.n(); ++i) {
+      const model::JointLimits& l = chain.joint(i).limits;
+      limits_.push_back(l);
+      weak_ = weak_ || std::isfinite(l.effort);
+      limited_ = limited_ || std::isfinite(l.lower) || std::isfinite(l.upper) || std::isfinite(l.velocity);
+    }
   }
 
   State start(const VectorXd& q0, const VectorXd& qd0) const override { return marcher_.start(q0, qd0); }
@@ -121,6 +126,7 @@ class Arm final : public Integrator::Impl {
   /// Takes tau as far as the joints give it; how many give less.
   int cut(const double* tau) noexcept {
     double* given = load_.tau.data();
+    if (!weak_) return std::copy_n(tau, axis_.n(), given), 0;
     int count = 0;
     for (const model::JointLimits& limits : limits_) {
       *given = std::clamp(*tau, -limits.effort, limits.effort);
@@ -129,6 +135,7 @@ class Arm final : public Integrator::Impl {
     return count;
   }
   int outside(const State& s) const noexcept {
+    if (!limited_) return 0;
     const double *q = s.q.data(), *qd = s.qd.data();
     int count = 0;
     for (const model::JointLimits& limits : limits_) {
@@ -140,6 +147,7 @@ class Arm final : public Integrator::Impl {
 
   typename G::Chain axis_;
   std::vector<model::JointLimits> limits_;
+  bool weak_ = false, limited_ = false;  ///< any joint: in its effort; in position or velocity
   Load<G> load_;
   Marcher<G> marcher_;
 };

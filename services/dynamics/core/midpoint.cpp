@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "services/dynamics/core/rounding.h"
 
@@ -37,6 +38,7 @@ MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
       gravity_(std::sqrt(dot(chain.gravity_W, chain.gravity_W))),
       contraction_(chain.n()),
       d_(VectorXd::Zero(chain.n())),
+      d_placed_(d_),
       r_(d_),
       p_next_(d_),
       scale_inv_(d_),
@@ -56,7 +58,7 @@ MidpointStep<G>::MidpointStep(const Chain& chain, const Options& options)
 template <class G>
 void MidpointStep<G>::begin(const Node<G>& from, const Load<G>& load, double h) noexcept {
   from_ = &from, load_ = &load, h_ = h, rate_ = 1 / h;
-  linearised_ = false, rescale_ = true, feedback_ = {};
+  linearised_ = false, rescale_ = true, placed_ = false, feedback_ = {};
 }
 
 template <class G>
@@ -73,7 +75,8 @@ StepReport MidpointStep<G>::advance(const Node<G>& from, const Load<G>& load, do
   IncrementHistory::push(from, h, remembered(), d_, to);
   to.q = from.q + d_;
   to.place(chain_, to.q);
-  to.move_with_momentum(chain_, p_next_);
+  to.p.swap(p_next_);
+  to.move_with_momentum(chain_);
   return report;
 }
 
@@ -106,21 +109,34 @@ void MidpointStep<G>::choose_factorisation(const VectorXd& d) noexcept {
   frames_ = &X_factor_, factor_ = &own_factor_;
 }
 
+/// Frames at q + d/2.  From one evaluation of a step to the next they change little.
 template <class G>
-void MidpointStep<G>::forward(const double* d) noexcept {
+void MidpointStep<G>::place(const double* d) noexcept {
   const double* q = from_->q.data();
   double* u = u_.data();
   for (int i = 0; i < chain_.n(); ++i) u[i] = q[i] + 0.5 * d[i];
-  rbd::place(chain_, u_.data(), X_.data());
+  if constexpr (G::kPlanar) {
+    double* placed = d_placed_.data();
+    const auto change = [&](int i) { return 0.5 * (d[i] - std::exchange(placed[i], d[i])); };
+    if (placed_ && rbd::turn_on(chain_, u, change, X_.data())) return;
+    placed_ = true;
+    std::copy_n(d, chain_.n(), placed);
+  }
+  rbd::place(chain_, u, X_.data());
+}
+
+template <class G>
+void MidpointStep<G>::forward(const double* d) noexcept {
+  place(d);
   Motion V;
-  Direction g = chain_.gravity_W;
+  [[maybe_unused]] Direction g = chain_.gravity_W;
   const double rate = rate_;
   for (int i = 0; i < chain_.n(); ++i) {
     const auto& X = X_[at(i)];
     V = to_child(X, V);
     add_along(chain_[i], X, V, d[i] * rate);
     V_[at(i)] = V;
-    g_[at(i)] = g = turn_to_child(X, g);
+    if constexpr (!G::kPlanar) g_[at(i)] = g = turn_to_child(X, g);
   }
 }
 
@@ -135,7 +151,7 @@ Residual MidpointStep<G>::backward(const double* d) noexcept {
   const double quiet = kQuiet * chain_.energy_scale;
   const double *q = from_->q.data(), *p = from_->p.data(), *tau = load_->tau.data(), *pushed = push_.data();
   double *r = r_.data(), *p_next = p_next_.data(), *scale_inv = scale_inv_.data();
-  const bool rescale = rescale_;
+  const bool rescale = rescale_, brakes = brakes_;
   double largest = 0, relative = 0, poison = 0;  // of |r|
   for (int i = chain_.n(); i-- > 0;) {
     const auto& k = chain_[i];
@@ -143,9 +159,11 @@ Residual MidpointStep<G>::backward(const double* d) noexcept {
     const Motion& V = V_[at(i)];
     H = H + momentum(k, X, V);
     add_moment(k, X, moment);
-    const double force = tau[i] + pushed[i] + resistance(k, d[i] * rate, stiffness, q[i] + 0.5 * d[i]);
+    const double brake = brakes ? resistance(k, d[i] * rate, stiffness, q[i] + 0.5 * d[i]) : 0;
+    const double force = tau[i] + pushed[i] + brake;
     const double rotor = k.armature * d[i] * rate, push = half * force;
-    const double turn = half * (coadjoint_along(k, X, V, H) + weight_along(k, X, moment, g_[at(i)]));
+    const Direction& g = G::kPlanar ? chain_.gravity_W : g_[at(i)];
+    const double turn = half * (coadjoint_along(k, X, V, H) + weight_along(k, X, moment, g));
     r[i] = along(k, X, H) + rotor - turn - p[i] - push;
     p_next[i] = p[i] + 2 * (turn + push);
     if (rescale) {
@@ -186,8 +204,9 @@ bool MidpointStep<G>::newton_pays() const noexcept {
 template <class G>
 void MidpointStep<G>::correct(VectorXd& d) noexcept {
   if (!newton_pays()) {
-    rbd::solve<G, double>(chain_, frames_->data(), factor_->data(), r_.data(), u_.data(), r_.data());
-    d -= h_ * r_;
+    double* increment = d.data();
+    rbd::solve<G, double>(chain_, frames_->data(), factor_->data(), r_.data(), u_.data(),
+                          [&, h = h_](int i, double x) { increment[i] -= h * x; });
     return;
   }
   if (!linearised_ || contraction_.rate() > kStale) {

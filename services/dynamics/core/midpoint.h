@@ -45,6 +45,7 @@ class MidpointStep final : public TierStep<G> {
 
  private:
   void choose_factorisation(const VectorXd& d) noexcept;
+  void place(const double* d) noexcept;
   void forward(const double* d) noexcept;
   Residual backward(const double* d) noexcept;
   JointRow<G> row(int i, const typename G::template Attitude<double>& R, const Motion& H,
@@ -65,13 +66,14 @@ class MidpointStep final : public TierStep<G> {
   const Frames<G>* frames_ = nullptr;  ///< where factor_ was made
   const Factors<G>* factor_ = nullptr;
   // scratch
-  VectorXd d_, r_, p_next_, scale_inv_, extra_, u_;  ///< scale_inv_: 1 / what a residual is measured by
+  VectorXd d_, d_placed_;                        ///< d_placed_, in the plane: where X_ is
+  VectorXd r_, p_next_, scale_inv_, extra_, u_;  ///< scale_inv_: 1 / what a residual is measured by
   Frames<G> X_, X_factor_;
   Factors<G> own_factor_;
   Motions<G> V_;
   std::vector<Direction> g_;
   Push<G> push_;
-  bool rescale_ = true, brakes_ = false;  ///< brakes_: damping or stops
+  bool rescale_ = true, placed_ = false, brakes_ = false;  ///< brakes_: damping or stops
   // Newton: the factorisation serves while it converges fast
   ChainNewton<G> newton_;
   bool linearised_ = false;  ///< in this step

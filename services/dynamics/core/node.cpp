@@ -35,13 +35,19 @@ void Node<G>::place(const Chain& chain, const VectorXd& q_new) noexcept {
 }
 
 template <class G>
-void Node<G>::move_with_momentum(const Chain& chain, const VectorXd& p_new) noexcept {
-  p = p_new;
+void Node<G>::move_with_momentum(const Chain& chain) noexcept {
   Moment<G> moment{chain, X.data()};
   rbd::Inward<G, double> inward{chain, X.data(), factor.data(), p.data(), scratch_.data()};
   rbd::factorise<G, double>(chain, X.data(), nullptr, factor.data(), [&](int i) { inward(i), moment(i); });
-  rbd::solve_outward<G, double>(chain, X.data(), factor.data(), scratch_.data(), qd.data());
-  kinetic_J = 0.5 * p.dot(qd);
+  // numbers just written are not read two at a time: that would wait for both stores
+  const double* momenta = p.data();
+  double* rate = qd.data();
+  double twice = 0;
+  rbd::solve_outward<G, double>(chain, X.data(), factor.data(), scratch_.data(), [&](int i, double x) {
+    rate[i] = x;
+    twice += momenta[i] * x;
+  });
+  kinetic_J = 0.5 * twice;
   energy_J = kinetic_J + moment.potential_J();
 }
 

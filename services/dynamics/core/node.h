@@ -38,8 +38,8 @@ struct Node {
 
   /// Frames at q.
   void place(const Chain& chain, const VectorXd& q_new) noexcept;
-  /// Factorises M(q); qd = M^-1 p and the energy.
-  void move_with_momentum(const Chain& chain, const VectorXd& p_new) noexcept;
+  /// Factorises M(q); qd = M^-1 p, of the p that stands here, and the energy.
+  void move_with_momentum(const Chain& chain) noexcept;
   /// p = M qd and the energy; M(q) is not factorised.
   void move_with_velocity(const Chain& chain, const VectorXd& qd_new) noexcept;
 

@@ -38,7 +38,8 @@ StepReport PaperStep<G>::advance(const Node<G>& from, const Load<G>& load, doubl
   for (int i = 0; i < chain_.n(); ++i) V_[at(i)] = carried(from.X[at(i)], to.X[at(i)], V_[at(i)]);
   gather(to, options_.alpha, 1, p_);
   for (int i = 0; i < chain_.n(); ++i) p_[i] += chain_[i].armature * d_[i] / h_ + 0.5 * h_ * force(i, d_[i]);
-  to.move_with_momentum(chain_, p_);
+  to.p = p_;
+  to.move_with_momentum(chain_);
   return report;
 }
 
@@ -182,7 +183,8 @@ void PaperStep<G>::correct(VectorXd& d) noexcept {
     d -= r_;
     return;
   }
-  rbd::solve<G, double>(chain_, from_->X.data(), from_->factor.data(), r_.data(), u_.data(), r_.data());
+  rbd::solve<G, double>(chain_, from_->X.data(), from_->factor.data(), r_.data(), u_.data(),
+                        rbd::into(r_.data()));
   d -= h_ * r_;
 }
 

@@ -89,16 +89,16 @@ Barrier::Barrier(const Arm& arm, const scene::PlannerOptions& options)
   const Eigen::Index most = static_cast<Eigen::Index>(Pairs::kMost) + 8 * arm.n();
   A_ = Eigen::MatrixXd::Zero(arm.n(), most);
   C_ = A_;
+  L_inverse_ = Eigen::MatrixXd::Identity(arm.n(), arm.n());
   b_ = s_ = length_ = give_ = VectorXd::Zero(most);
   x_ = VectorXd::Zero(arm.n());
   pair_of_row_.reserve(Pairs::kMost);
 }
 
-// A_.col(rows_) is filled; finishes the row unless nothing can act on it.
-void Barrier::add_row(const Arm& arm, double b, double price) noexcept {
+// A_.col(rows_) and C_.col(rows_) = L^-1 of it are filled, where M = L L^T; finishes the row unless nothing
+// can act on it.
+void Barrier::add_row(double b, double price) noexcept {
   auto c = C_.col(rows_);
-  c = A_.col(rows_);
-  arm.M_llt.matrixL().solveInPlace(c);
   const double length = c.norm();
   if (!(length > 1e-9) || !std::isfinite(length) || !std::isfinite(b)) return;
   c /= length;
@@ -120,8 +120,10 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
     const double h = pair.d - options_.dmin_m, hd = -pair.n.dot(pair.v_relative);
     const double curvature = std::min(distance_curvature(pair, omega, 1 / g), 0.0);
     A_.col(rows_).noalias() = -pairs.J(k).transpose().lazyProduct(pair.n);
+    C_.col(rows_) = A_.col(rows_);
+    arm.M_llt.matrixL().solveInPlace(C_.col(rows_));
     const Eigen::Index before = rows_;
-    add_row(arm, -2 * g * hd - g * g * h + pair.n.dot(bias) - curvature, kDistancePrice);
+    add_row(-2 * g * hd - g * g * h + pair.n.dot(bias) - curvature, kDistancePrice);
     if (rows_ > before) pair_of_row_.push_back(k);
   }
 }
@@ -130,10 +132,13 @@ void Barrier::add_pair_rows(const Arm& arm, Pairs& pairs) noexcept {
 // one period never all of it.
 void Barrier::add_joint_rows(const Arm& arm, double dt_s) noexcept {
   const double g = gain_, rate = std::min(g, 1 / dt_s);
+  L_inverse_.setIdentity();
+  for (int j = 0; j < arm.n(); ++j) arm.M_llt.matrixL().solveInPlace(L_inverse_.col(j));
   const auto row = [&](int j, double sign, double b, double price) {  // sign * a_j >= b
     A_.col(rows_).setZero();
     A_(j, rows_) = sign;
-    add_row(arm, b, price);
+    C_.col(rows_) = sign * L_inverse_.col(j);
+    add_row(b, price);
   };
   for (int j = 0; j < arm.n(); ++j) {
     const model::JointLimits& limits = arm.chain.joint(j).limits;
@@ -162,10 +167,13 @@ void Barrier::add_torque_rows(const Arm& arm) noexcept {
   for (int j = 0; j < arm.n(); ++j) {
     const double limit = arm.chain.joint(j).limits.effort, rest = arm.coriolis[j] + arm.gravity[j];
     if (!std::isfinite(limit)) continue;
-    A_.col(rows_) = arm.M.col(j);
-    add_row(arm, -limit - rest, kTorquePrice);
-    A_.col(rows_) = -arm.M.col(j);
-    add_row(arm, -limit + rest, kTorquePrice);
+    for (const double sign : {1.0, -1.0}) {
+      A_.col(rows_) = sign * arm.M.col(j);
+      C_.col(rows_).setZero();
+      C_.col(rows_).head(j + 1) =
+          sign * arm.M_llt.matrixLLT().row(j).head(j + 1).transpose();  // L^-1 M = L^T
+      add_row(-limit - sign * rest, kTorquePrice);
+    }
   }
 }
 

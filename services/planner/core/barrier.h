@@ -45,7 +45,7 @@ class Barrier {
   void keep_torque(const Arm& arm, Eigen::VectorXd& a) noexcept;
 
  private:
-  void add_row(const Arm& arm, double b, double price) noexcept;
+  void add_row(double b, double price) noexcept;
   void add_pair_rows(const Arm& arm, Pairs& pairs) noexcept;
   void add_joint_rows(const Arm& arm, double dt_s) noexcept;
   double acceleration_limit(const Arm& arm, int j) const noexcept;
@@ -54,7 +54,8 @@ class Barrier {
 
   const scene::PlannerOptions& options_;
   LeastNorm least_norm_;
-  Eigen::MatrixXd A_, C_;  ///< a row's coefficients as a column; L^-1 times it, to length 1
+  Eigen::MatrixXd A_, C_;      ///< a row's coefficients as a column; L^-1 times it, to length 1
+  Eigen::MatrixXd L_inverse_;  ///< M = L L^T
   Eigen::VectorXd b_, s_, length_, give_, x_;
   std::vector<std::size_t> pair_of_row_;
   double gain_ = 0;  ///< of this cycle [1/s]
