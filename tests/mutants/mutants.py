@@ -81,6 +81,8 @@ MUTANTS = [
            "planner_force_law_test", "Mapping.*"),
     Mutant("mapping_without_trace", "symmetric is the skew part of the paper's", PLAN + "mapping.cpp", "0.5 * (Lam.trace() * w - Lam * w)",
            "0.5 * (Lam.trace() * w + Lam * w)", "planner_force_law_test", "*SkewPart*"),
+    Mutant("turned_from_the_start", "the gyroscopic force does no work over a step", PLAN + "gyro.cpp", "tau_gyro_.noalias() = G_ * v_mid_;",
+           "tau_gyro_.noalias() = G_ * arm.qd;", "planner_power_test", "*NoWork*"),
     Mutant("gate_of_who_leaves", "only who closes is turned", PLAN + "force_law.cpp", "closing <= 0", "closing >= 0",
            "planner_force_law_test", "*"),
     Mutant("gain_without_speed", "stops at the closed form", PLAN + "force_law.cpp", "o.kobs * n.dot(v) / near * open", "o.kobs / near * open",
