@@ -52,7 +52,7 @@ void PlannerService::pursue_again(const Reachability& known) {
 /// In a cycle: the answer enters kLook_s after the first one that waited for it.
 void PlannerService::take_look() {
   if (!reach_.asked()) return;
-  const auto steps = static_cast<std::uint64_t>(std::ceil(kLook_s / state_.dt_s));
+  const auto steps = static_cast<std::uint64_t>(std::ceil(kLook_s / scene_.dynamics.dt_s));
   if (!look_due_) look_due_ = state_.step + steps;
   if (state_.step >= *look_due_) enter_look(waits());
 }
