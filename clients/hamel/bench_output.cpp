@@ -51,11 +51,6 @@ std::string columns(const std::optional<Dropout>& d) {
 
 }  // namespace
 
-std::string label(const Cell& cell) {
-  if (!cell.variant.empty()) return cell.family + ", " + cell.variant;
-  return cell.spheres > 0 ? cell.family + " " + std::to_string(cell.spheres) : cell.family;
-}
-
 void print_table(const std::vector<CellTally>& all) {
   for (const CellTally& c : all) {
     fmt::print("\n{} ({} scenes)\n", label(c.cell), c.tallies.front().size());

@@ -5,21 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "clients/hamel/bench_families.h"
 #include "clients/hamel/bench_tally.h"
 #include "common/base/result.h"
 
 namespace hamel::client {
 
-/// The tallies of one cell, one for each method.
-struct CellTally {
-  Cell cell;
-  std::vector<std::string> methods;
-  std::vector<Tally> tallies;
-};
-
-/// "panda_static 16" or "example_5_2, damping 0.5, vmax 1".
-std::string label(const Cell& cell);
 void print_table(const std::vector<CellTally>& all);
 /// How arms stopped once the obstacle stream had ended, of those that moved then.
 void print_dropouts(const std::vector<CellTally>& all);

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/hamel/bench_output.h"
+#include "clients/hamel/bench_tally.h"
 
 namespace hamel::client {
 

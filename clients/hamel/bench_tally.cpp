@@ -86,4 +86,9 @@ double Tally::jerkiness() const {
   return quantile(std::move(v), 0.5);
 }
 
+std::string label(const Cell& cell) {
+  if (!cell.variant.empty()) return cell.family + ", " + cell.variant;
+  return cell.spheres > 0 ? cell.family + " " + std::to_string(cell.spheres) : cell.family;
+}
+
 }  // namespace hamel::client

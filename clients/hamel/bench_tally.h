@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/hamel/bench_families.h"
 #include "clients/hamel/trial.h"
 
 namespace hamel::client {
@@ -52,5 +53,15 @@ class Tally {
   std::vector<Figures> all_;
   Durations cycle_;
 };
+
+/// The tallies of one cell, one for each method.
+struct CellTally {
+  Cell cell;
+  std::vector<std::string> methods;
+  std::vector<Tally> tallies;
+};
+
+/// "panda_static 16" or "example_5_2, damping 0.5, vmax 1".
+std::string label(const Cell& cell);
 
 }  // namespace hamel::client

@@ -226,7 +226,7 @@ bool Judge::Impl::look(double t_s, double share, const Eigen::VectorXd& q) {
       o.due_m[k] = gone(b) + there + budget(d);
       if (d > 0) continue;
       contact = {t_s, b.link < 0 ? "base" : "link " + chain.link(b.link).name, o.now.id, false, false};
-      touch(t_s, q, b, o.solid, X_WO);
+      if (!o.fresh) touch(t_s, q, b, o.solid, X_WO);
       return false;
     }
   }

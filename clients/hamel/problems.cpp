@@ -99,7 +99,7 @@ lie::Pose before_grasp(const scene::Robot& robot, const scene::Scene& s, const E
     scene::Goal goal;
     goal.kind = scene::GoalKind::pose;
     goal.X_WG = {X_WE.R, X_WE.p + back_W};
-    if (room_m >= kGoalClear_m && planner::reachability(robot.chain, goal, {}).reachable) return goal.X_WG;
+    if (room_m >= kGoalClear_m && planner::reachability(robot.chain, {goal}, {}).reachable) return goal.X_WG;
   }
   return X_WE;
 }

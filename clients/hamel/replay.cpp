@@ -108,7 +108,7 @@ std::optional<Problem> into_planner(bus::Node& node, const Tape& tape, Compariso
   Judge reports(node, topics::kReport, tape.reports, comparison);
   Feed states(node, topics::kState, tape.states), obstacles(node, topics::kObstacles, tape.obstacles),
       goals(node, topics::kGoal, tape.goals), modes(node, topics::kMode, tape.modes);
-  auto service = planner::PlannerService::make(node, *tape.scene, {.pace = tape.pace});
+  auto service = planner::PlannerService::make(node, *tape.scene, {.pace = tape.pace, .patient = true});
   if (!service) return service.error();
   const std::size_t end = first_life(tape.commands, "the planner or the arm", note);
   Time now = runtime::Clock::now();

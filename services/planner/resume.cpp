@@ -150,7 +150,7 @@ void PlannerService::save() {
   p.put(static_cast<std::uint32_t>(command_.planner_state));
   p.put(command_.torque.data(), static_cast<std::size_t>(command_.torque.size()));
   p.put(command_.caused_by);
-  const bool waiting = planner_.memory().waypoint.waiting != 0 && escape_.valid();
+  const bool waiting = planner_.memory().waypoint.waiting != 0 && escape_.asked();
   p.put(static_cast<std::uint64_t>(waiting));
   if (waiting) packed_.insert(packed_.end(), packed_question_.begin(), packed_question_.end());
   checkpoint_->save(packed_);
@@ -186,11 +186,11 @@ std::string PlannerService::load(std::span<const std::byte> bytes) {
   command_.planner_state = static_cast<wire::PlannerState>(last_state);
   if (mode >= 0) mode_ = static_cast<wire::Mode>(mode);
   mode_id_ = mode_id;
-  if (goal.id > 0) {
+  planner_.restore(*memory);
+  if (goal.id > 0) {  // which the memory may not have begun with
     goal_ = goal;
     planner_.set_goal(goal);
   }
-  planner_.restore(*memory);
   if (waiting != 0) start_escape();
   spdlog::info("resumed at step {} with goal {}", step, goal_ ? goal_->id : 0);
   return {};

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/runtime/options.h"
-#include "common/runtime/realtime.h"
 #include "services/planner/convert.h"
 
 namespace hamel::planner {
@@ -78,10 +77,10 @@ void PlannerService::take_goals() {
     if (g.arm != scene_.arm || (goal_ && g.id < goal_->id)) continue;
     if (!goal_ || g.id > goal_->id) {
       spdlog::info("goal {}", g.id);
-      forget_escape();
+      escape_.forget();
     }
     goal_ = from_wire(g);
-    planner_.set_goal(*goal_);
+    pursue();
   }
 }
 
@@ -95,9 +94,9 @@ void PlannerService::take_modes() {
     } else {
       if (m.mode == wire::Mode::resume) mode_.reset();
       // From rest again, without the clocks and faults of before: the goal is as new.
-      forget_escape();
+      escape_.forget();
       planner_.clear_goal();
-      if (goal_) planner_.set_goal(*goal_);
+      pursue_again(planner_.reach());
       planner_.ramp_in();
     }
   }
@@ -178,10 +177,11 @@ void PlannerService::meet(const wire::ArmState& s) {
         "of the scene holds",
         s.arm, goal_ ? goal_->id : 0);
   view_.begin(s.incarnation);
-  forget_escape();
+  escape_.forget();
   memory_step_.reset();
+  const Reachability found = planner_.reach();
   planner_ = Planner(scene_.robot, scene_.planner, savings(scene_));
-  if (goal_) planner_.set_goal(*goal_);
+  pursue_again(found);
 }
 
 bool PlannerService::answer(Time now) {
@@ -234,6 +234,7 @@ void PlannerService::plan(Time now) {
                  .state_age_s = lockstep ? 0 : std::chrono::duration<double>(now - last_state_).count(),
                  .obstacles_expected = true,
                  .link_floor_m = view_.link_floor_m()};
+  take_look();
   take_escape();
   planner_.plan(in, output_);
   if (output_.report.escape_asked) {
@@ -244,56 +245,6 @@ void PlannerService::plan(Time now) {
   memory_step_ = state_.step;
   ++cycles_;
   cycle_s_ = std::chrono::duration<double>(runtime::Clock::now() - began).count();
-}
-
-/// Rollouts run beside the control thread; their answer enters at a step known beforehand, so that results do
-/// not depend on the thread's speed.
-void PlannerService::ask_escape(const Input& in) {
-  question_ = planner_.escape_question(in);
-  start_escape();
-  if (output_.report.state == State::stuck)
-    spdlog::info("t = {:.3f} s: stuck ({}); looking for a way out", in.t_s, to_string(output_.report.reason));
-  else
-    spdlog::info("t = {:.3f} s: little progress; looking for a quicker way", in.t_s);
-}
-
-void PlannerService::start_escape() {
-  forget_escape();
-  pack_question();
-  escape_due_ = question_.step + planner_.escape_steps(scene_.dynamics.dt_s);
-  escape_stop_ = false;
-  escape_ = std::async(std::launch::async, [this, question = question_] {
-    runtime::go_ordinary();  // many cycles' work: beside the loop, not before it
-    return find_escape(scene_.robot, scene_.planner, question, [this] { return escape_stop_.load(); });
-  });
-}
-
-/// Ends a question that nobody waits for any more, in the time of one rollout's cycle.
-void PlannerService::forget_escape() {
-  escape_stop_ = true;
-  escape_ = {};
-}
-
-/// Lockstep waits for an answer that is due; real time takes it once it is there.
-void PlannerService::take_escape() {
-  const Waypoint& w = planner_.memory().waypoint;
-  if (w.waiting != 0 && (!escape_.valid() || w.asked_step != question_.step)) {
-    planner_.take_escape({}, state_.t_s);  // nobody thinks about it: it will be asked again
-    return;
-  }
-  if (!escape_.valid() || state_.step < escape_due_) return;
-  const bool lockstep = config_.pace == scene::Pace::lockstep;
-  if (!lockstep && escape_.wait_for(0s) != std::future_status::ready) return;
-  const Escape escape = escape_.get();
-  if (w.waiting == 0) return;  // another goal meanwhile
-  if (escape.found)
-    spdlog::info("t = {:.3f} s: waypoint {} leads out; goal expected in {:.1f} s", state_.t_s,
-                 escape.rollouts, escape.reached_after_s);
-  else if (escape.rollouts > 0)
-    spdlog::info("t = {:.3f} s: {} rollouts found no way out", state_.t_s, escape.rollouts);
-  else
-    spdlog::info("t = {:.3f} s: the way it goes leads to the goal", state_.t_s);
-  planner_.take_escape(escape.waypoint, state_.t_s);
 }
 
 void PlannerService::fill_command() {
@@ -313,6 +264,8 @@ void PlannerService::publish_report(Time now, bool always) {
     report_.state = wire::PlannerState::idle;
     report_.reason = wire::Reason::none;
     report_.detail = *mode_ == wire::Mode::stop ? "stopped by a mode command" : "holding by a mode command";
+  } else if (looking_) {
+    report_.detail = "looking whether the next goal can be reached";
   }
   const bool changed = report_.state != shown_ || report_.reason != shown_reason_;
   if (!always && !changed && now - last_report_ < kReportPeriod) return;
@@ -333,7 +286,7 @@ void PlannerService::send_report(Time now) {
   last_report_ = now;
   report_.arm = scene_.arm;
   report_.epoch = epoch_;
-  report_.goal_id = goal_ ? goal_->id : 0;
+  report_.goal_id = looking_ ? planner_.memory().goal_id : goal_ ? goal_->id : 0;
   report_.mode_id = mode_id_;
   report_out_.publish(report_);
 }
@@ -363,6 +316,7 @@ void PlannerService::report_silence(Time now) {
     report_.state = wire::PlannerState::unsafe;
     report_.reason = wire::Reason::stale_state;
     report_.detail = "the arm's state is stale";
+    enter_look(false);  // no cycle comes that it could wait for
   } else {
     return;
   }

@@ -2,8 +2,6 @@
 /// The planner service in its shell: states, obstacles, goals and modes in, commands and reports out.
 
 #include <algorithm>
-#include <atomic>
-#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,8 +12,10 @@
 #include "common/runtime/presence.h"
 #include "common/scene/cadence.h"
 #include "common/wire/endpoint.h"
+#include "services/planner/aside.h"
 #include "services/planner/core/escape.h"
 #include "services/planner/core/planner.h"
+#include "services/planner/core/reachable.h"
 #include "services/planner/obstacle_view.h"
 
 namespace hamel::planner {
@@ -25,6 +25,7 @@ struct ServiceConfig {
   std::string state_dir = {};  ///< checkpoint folder; empty: none
   std::uint32_t strength = 0;  ///< of several planners for one arm the strongest that is heard drives it
   runtime::BootId boot = runtime::boot_id();
+  bool patient = false;  ///< real time waits, too, for an answer that is due: for replays, which have time
 };
 
 class PlannerService final : public runtime::Service {
@@ -32,7 +33,6 @@ class PlannerService final : public runtime::Service {
   /// Fails where the checkpoint cannot be opened.
   static Result<std::unique_ptr<PlannerService>, Problem> make(bus::Node& node, const scene::Scene& scene,
                                                                const ServiceConfig& config);
-  ~PlannerService() override { forget_escape(); }
   bool poll(runtime::Clock::time_point now) override;
   runtime::Clock::time_point due() const override;
   bool finished() const override { return false; }
@@ -49,9 +49,13 @@ class PlannerService final : public runtime::Service {
   void take_obstacles();
   void meet(const wire::ArmState& s);
   bool leaps(const wire::ArmState& s, Time now);
-  void forget_escape();
   bool answer(Time now);
   void plan(Time now);
+  bool waits() const;
+  void pursue();
+  void pursue_again(const Reachability& known);
+  void take_look();
+  void enter_look(bool wait);
   void ask_escape(const Input& in);
   void start_escape();
   void take_escape();
@@ -73,8 +77,8 @@ class PlannerService final : public runtime::Service {
   scene::Cadence cadence_;
   Planner planner_;
   Output output_;
-  std::uint64_t epoch_ = 1;  ///< strength * 2^32 + starts
-  std::optional<scene::Goal> goal_;
+  std::uint64_t epoch_ = 1;          ///< strength * 2^32 + starts
+  std::optional<scene::Goal> goal_;  ///< the newest
 
   wire::Publisher<wire::TorqueCommand> command_out_;
   wire::Publisher<wire::PlannerReport> report_out_;
@@ -105,11 +109,15 @@ class PlannerService final : public runtime::Service {
   Time last_state_{}, last_report_{}, last_silence_{};
   std::unique_ptr<runtime::Checkpoint> checkpoint_;
   std::vector<std::byte> packed_;
-  std::atomic<bool> escape_stop_ = false;  ///< before escape_: outlives the question
-  std::future<Escape> escape_;             ///< valid: question_ is out, its answer due at step escape_due_
+  Aside<Escape> escape_;  ///< asked: question_ is out, its answer due at step escape_due_
   EscapeQuestion question_;
   std::vector<std::byte> packed_question_;
   std::uint64_t escape_due_ = 0;
+  Aside<Reachability> reach_;              ///< asked: whether goal looked_at_ can be reached
+  std::optional<std::uint64_t> look_due_;  ///< the step its answer is due at; none before a cycle has waited
+  std::uint64_t looked_at_ = 0;
+  bool looking_ = false;     ///< goal_ waits for the answer: the planner keeps to the one before
+  bool look_again_ = false;  ///< goal_ has moved on since it was asked about
   runtime::RateLimit refusals_, waits_;
   int leaps_in_a_row_ = 0;
   std::uint64_t states_discarded_ = 0;

@@ -100,6 +100,20 @@ TEST(Judge, AnArmThatStandsCausesNothing) {
   EXPECT_LE(judge.clearance_min_m(), 0.001);
 }
 
+// A recording may begin with somebody where the arm is.
+TEST(Judge, WhatAppearsWhereAMovingArmIsWasNotRunInto) {
+  const std::vector there{test::sphere(3, {0.9, 0, 0}, 0.1)};
+  for (const bool before : {true, false}) {
+    Judge judge(one_link());
+    Eigen::VectorXd q = Eigen::VectorXd::Constant(1, -0.3);
+    for (int k = 0; k < 10; ++k, q[0] += 0.03)
+      judge.advance(0.01 * k, q, std::span(there).first(before ? 1 : 0));
+    const Contact* c = judge.advance(0.1, q, there);
+    ASSERT_NE(c, nullptr);
+    EXPECT_EQ(c->arm_caused, before);
+  }
+}
+
 TEST(Judge, FindsTheSmallestDistance) {
   Judge judge(one_link());
   Eigen::VectorXd q(1);

@@ -35,7 +35,7 @@ TEST(Reach, RefusesNoGoalThatAConfigurationMeets) {
     scene::Goal goal;
     goal.kind = k % 2 ? scene::GoalKind::pose : scene::GoalKind::position;
     goal.X_WG = rbd::tip(chain, ws);
-    refused += !reachability(chain, goal, {}).reachable;
+    refused += !reachability(chain, {goal}, {}).reachable;
   }
   EXPECT_EQ(refused, 0);
 }
@@ -54,7 +54,7 @@ TEST(Reach, KnowsAnglesBeyondHalfATurn) {
     scene::Goal goal;
     goal.kind = scene::GoalKind::pose;
     goal.X_WG = rbd::tip(chain, ws);
-    refused += !reachability(chain, goal, {}).reachable;
+    refused += !reachability(chain, {goal}, {}).reachable;
   }
   EXPECT_EQ(refused, 0);
 }
@@ -65,11 +65,11 @@ TEST(Reach, RefusesWhatIsBeyondTheArmAndKnowsTheNearestPlace) {
     scene::Goal goal;
     const Vector3d along(std::cos(angle), std::sin(angle), 0);
     goal.X_WG.p = 5 * along;
-    const Reachability found = reachability(robot.chain, goal, {});
+    const Reachability found = reachability(robot.chain, {goal}, {});
     EXPECT_FALSE(found.reachable);
     EXPECT_NEAR((found.nearest_W - 4 * along).norm(), 0, 1e-2) << angle;
     goal.X_WG.p = 3.9 * along;
-    EXPECT_TRUE(reachability(robot.chain, goal, {}).reachable) << angle;
+    EXPECT_TRUE(reachability(robot.chain, {goal}, {}).reachable) << angle;
   }
 }
 

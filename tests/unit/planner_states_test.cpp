@@ -5,7 +5,7 @@
 
 #include "common/rbd/rbd.h"
 #include "services/planner/core/monitor.h"
-#include "tests/support/planner_scene.h"
+#include "tests/support/planner_bench.h"
 
 namespace hamel::test {
 namespace {
@@ -16,48 +16,7 @@ using planner::Planner;
 using planner::Reason;
 using planner::State;
 using scene::Method;
-
-// A planar arm bent to the left, its tip near (2, 2), one obstacle far away.
-struct Bench {
-  scene::Robot robot = planar_arm(4, 1.0 / 12, 0.05);
-  scene::PlannerOptions options;
-  std::vector<geometry::Obstacle> obstacles{sphere(1, {-3, 0, 0}, 0.2)};
-  Eigen::VectorXd q = Eigen::Vector4d(0, M_PI / 2, 0, -M_PI / 4), qd = Eigen::VectorXd::Zero(4);
-  scene::Goal goal;
-  double obstacle_age_s = 0, state_age_s = 0, t_s = 0, dt_s = 1e-3;
-  bool expected = false;
-
-  Bench() {
-    options.barrier_gain = 12;
-    goal.id = 1;
-    goal.X_WG.p = {1, 2.5, 0};
-  }
-  Input input() const {
-    return {.step = 0,
-            .t_s = t_s,
-            .dt_s = dt_s,
-            .q = q,
-            .qd = qd,
-            .obstacles = obstacles,
-            .obstacle_age_s = obstacle_age_s,
-            .state_age_s = state_age_s,
-            .obstacles_expected = expected};
-  }
-  Output plan(bool with_goal = true) const {
-    Planner p(robot, options);
-    if (with_goal) p.set_goal(goal);
-    Output out = p.output();
-    p.plan(input(), out);
-    return out;
-  }
-  RunResult go(double duration_s) const { return run(robot, obstacles, options, goal, q, dt_s, duration_s); }
-};
-
-void expect(const Output& out, State state, Reason reason) {
-  EXPECT_EQ(out.report.state, state) << planner::to_string(out.report.state);
-  EXPECT_EQ(out.report.reason, reason) << planner::to_string(out.report.reason);
-  EXPECT_NE(std::string(out.report.detail), "");
-}
+using Bench = PlannerBench;
 
 TEST(States, IdleWithoutGoalOnlyDamps) {
   Bench b;
@@ -255,59 +214,6 @@ TEST(States, MisfitIsAFault) {
   expect(b.plan(), State::fault, Reason::internal);
 }
 
-TEST(States, UnreachableIsSaidAtOnceAndNotTried) {
-  Bench b;
-  b.goal.X_WG.p = {3, 3, 0};
-  const Output out = b.plan();
-  expect(out, State::stuck, Reason::unreachable);
-  EXPECT_TRUE(out.torque_Nm.isZero());
-}
-
-TEST(States, AGoalInsideWhatStandsIsSaidAtOnceAndNotTriedUntilThatIsGone) {
-  Bench b;
-  b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
-  for (const Method method : {Method::attract, Method::khatib, Method::gyro_paper, Method::gyro}) {
-    b.options.method = method;
-    const Output out = b.plan();
-    expect(out, State::stuck, Reason::goal_blocked);
-    const bool pushes = method == Method::khatib;  // whatever stands there
-    EXPECT_EQ(out.torque_Nm.isZero(), !pushes);
-  }
-  const RunResult r = b.go(2);
-  EXPECT_EQ(r.last.reason, Reason::goal_blocked);
-  EXPECT_TRUE(r.qd.isZero());
-  b.obstacles[0].V_WO[3] = 0.01;  // it may yet move out of the way
-  expect(b.plan(), State::moving, Reason::none);
-  b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
-  b.obstacles[0].velocity_known = false;
-  expect(b.plan(), State::moving, Reason::none);
-  b.obstacles.clear();
-  EXPECT_EQ(b.go(30).last.state, State::reached);
-}
-
-TEST(States, AGoalThatHasRoomBesideWhatStandsIsTried) {
-  Bench b;
-  b.obstacles = {sphere(1, b.goal.X_WG.p + Eigen::Vector3d(0, 0.35, 0), 0.2)};
-  expect(b.plan(), State::moving, Reason::none);
-}
-
-// At a joint goal any link may be in the way, not the last alone.
-TEST(States, AJointGoalInWhichALinkStandsInSomethingIsSaidAtOnce) {
-  Bench b;
-  b.goal.kind = scene::GoalKind::joints;
-  b.goal.joints = Eigen::Vector4d(-0.5, 0.5, -0.5, 1);
-  const Eigen::Vector3d along(std::cos(-0.5), std::sin(-0.5), 0);
-  b.obstacles = {sphere(1, 0.7 * along, 0.1)};  // the first link, 5 cm thick
-  const Output out = b.plan();
-  expect(out, State::stuck, Reason::goal_blocked);
-  EXPECT_TRUE(out.torque_Nm.isZero());
-  b.obstacles = {sphere(1, 0.7 * along + Eigen::Vector3d(0, 0, 0.2), 0.1)};
-  expect(b.plan(), State::moving, Reason::none);
-  b.obstacles[0].X_WO.p = 0.7 * along;
-  b.obstacles[0].V_WO[5] = 0.01;
-  expect(b.plan(), State::moving, Reason::none);
-}
-
 // A base that reaches farther than the arm does.
 TEST(States, WhatRunsIntoTheBaseIsToldWhereverItIs) {
   Bench b;
@@ -320,16 +226,6 @@ TEST(States, WhatRunsIntoTheBaseIsToldWhereverItIs) {
   const Output out = b.plan();
   expect(out, State::unsafe, Reason::contact);
   EXPECT_NE(std::string(out.report.detail).find("base"), std::string::npos);
-}
-
-TEST(States, BlockedGoalIsNamed) {
-  Bench b;
-  b.options.unreachable = scene::Unreachable::approach;
-  b.obstacles = {sphere(1, b.goal.X_WG.p, 0.2)};
-  const RunResult r = b.go(30);
-  EXPECT_EQ(r.last.state, State::stuck);
-  EXPECT_EQ(r.last.reason, Reason::goal_blocked);
-  EXPECT_EQ(r.contact_at_s, -1);
 }
 
 TEST(States, JointLimitIsNamed) {
@@ -386,26 +282,6 @@ TEST(States, WeakJointsAreNamed) {
   expect(b.plan(), State::unsafe, Reason::torque_limit);
 }
 
-TEST(States, NewGoalAfterReachedMovesOn) {
-  Bench b;
-  Planner p(b.robot, b.options);
-  Output out = b.plan();
-  b.goal.X_WG.p = out.report.end_effector_m;
-  p.set_goal(b.goal);
-  for (int k = 0; k < 200; ++k, b.t_s += 1e-3) p.plan(b.input(), out);
-  EXPECT_EQ(out.report.state, State::reached);
-  b.goal.id = 2;
-  b.goal.X_WG.p[0] += 0.5;
-  p.set_goal(b.goal);
-  p.plan(b.input(), out);
-  expect(out, State::moving, Reason::none);
-  EXPECT_EQ(out.report.goal_id, 2u);
-  EXPECT_LT(out.report.time_to_goal_s, 0);
-  p.clear_goal();
-  p.plan(b.input(), out);
-  expect(out, State::idle, Reason::none);
-}
-
 TEST(States, RampBeginsWithAHold) {
   Bench b;
   Planner p(b.robot, b.options);
@@ -421,33 +297,6 @@ TEST(States, RampBeginsWithAHold) {
   b.t_s = 0.3;
   p.plan(b.input(), out);
   EXPECT_NEAR(out.torque_Nm.norm() / full, 1, 1e-9);
-}
-
-TEST(Goals, JointTargetIsReached) {
-  Bench b;
-  b.goal.kind = scene::GoalKind::joints;
-  b.goal.joints = Eigen::Vector4d(0.5, 0.5, -0.5, 1);
-  b.options.vmax_mps = 1;
-  const RunResult r = b.go(15);
-  EXPECT_EQ(r.last.state, State::reached);
-  EXPECT_LT((r.q - b.goal.joints).lpNorm<Eigen::Infinity>(), 0.01);
-}
-
-TEST(Goals, PoseIsReachedInOrientationToo) {
-  Bench b;
-  b.goal.kind = scene::GoalKind::pose;
-  b.goal.X_WG.R = Eigen::AngleAxisd(2.5, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  const RunResult r = b.go(15);
-  EXPECT_EQ(r.last.state, State::reached);
-  EXPECT_LT(r.last.orientation_error_rad, 0.02);
-  EXPECT_NEAR(std::remainder(r.q.sum() - 2.5, 2 * M_PI), 0, 0.02);
-}
-
-TEST(Goals, MovingTargetIsFollowed) {
-  Bench b;
-  b.goal.V_WG.tail<3>() = Eigen::Vector3d(-0.1, 0, 0);
-  const RunResult r = b.go(8);
-  EXPECT_LT(r.last.target_error_m, 0.01);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "services/planner/core/escape.h"
 #include "services/planner/core/holds.h"
 #include "services/planner/core/planner_impl.h"
+#include "services/planner/core/reachable.h"
 #include "services/planner/core/report.h"
 
 namespace hamel::planner {
@@ -28,16 +29,28 @@ Output Planner::output() const {
 }
 
 void Planner::set_goal(const scene::Goal& goal) {
+  const auto question = reach_question(goal);
+  set_goal(goal, question ? reachability(impl_->arm.chain, *question, impl_->options) : reach());
+}
+
+void Planner::set_goal(const scene::Goal& goal, const Reachability& found) {
   Impl& p = *impl_;
-  const bool joints = goal.kind == scene::GoalKind::joints;
-  p.goal = goal;
   p.has_goal = true;
-  p.goal_fits = joints ? goal.joints.size() == p.arm.n() && goal.joints.allFinite()
-                       : goal.X_WG.p.allFinite() && goal.X_WG.R.allFinite() && goal.V_WG.allFinite();
-  p.look_for_a_way(goal);
+  p.pursue(goal, found);
   if (goal.id != p.memory.goal_id) p.memory.goal_started = 0;
   p.memory.goal_id = goal.id;
 }
+
+std::optional<ReachQuestion> Planner::reach_question(const scene::Goal& goal) const {
+  const Impl& p = *impl_;
+  if (goal.kind == scene::GoalKind::joints || !p.fits(goal)) return {};
+  const lie::Pose &X = goal.X_WG, &before = p.sought.X_WG;
+  const bool known = p.looked && goal.id == p.memory.goal_id && goal.kind == p.sought.kind;
+  if (known && X.p == before.p && X.R == before.R) return {};
+  return ReachQuestion{goal, known ? p.arm.q : VectorXd()};
+}
+
+const Reachability& Planner::reach() const noexcept { return impl_->reach; }
 
 void Planner::clear_goal() {
   impl_->has_goal = false;

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -118,6 +119,8 @@ struct Output {
 };
 
 struct EscapeQuestion;
+struct ReachQuestion;
+struct Reachability;
 
 /// A planner bound to one robot and one set of options.  Not for two threads at once.
 class Planner {
@@ -133,8 +136,14 @@ class Planner {
   Output output() const;
   /// A goal with a new id resets holds, flips and progress clocks; the same id again only moves the target.
   /// A goal that does not fit the robot (number of joints, not finite) makes plan() report FAULT
-  /// configuration.
+  /// configuration.  Whether the arm can meet it is searched for at once, for milliseconds; allocates.
   void set_goal(const scene::Goal& goal);
+  /// The same for a control thread: what set_goal() would search for, none where it need not, and the goal
+  /// with what was found elsewhere (reachable.h).
+  std::optional<ReachQuestion> reach_question(const scene::Goal& goal) const;
+  void set_goal(const scene::Goal& goal, const Reachability& found);
+  /// What was found for the goal that holds.
+  const Reachability& reach() const noexcept;
   void clear_goal();
   /// After a restart that lost its memory: the attraction ramps in over `ramp_s`, starting with a hold.
   void ramp_in() noexcept;

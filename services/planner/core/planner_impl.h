@@ -11,6 +11,7 @@
 #include "services/planner/core/monitor.h"
 #include "services/planner/core/pairs.h"
 #include "services/planner/core/planner.h"
+#include "services/planner/core/reachable.h"
 
 namespace hamel::planner {
 
@@ -51,7 +52,8 @@ struct Planner::Impl {
   void brake(double dt_s, Eigen::VectorXd& tau) noexcept;
   void report(const Verdict& verdict, Report& out) noexcept;
   double slow_down(const Input& in) const noexcept;
-  void look_for_a_way(const scene::Goal& wanted);
+  bool fits(const scene::Goal& wanted) const noexcept;
+  void pursue(const scene::Goal& wanted, const Reachability& found);
   Verdict approached(Verdict verdict) noexcept;
   bool approaching() const noexcept {
     return !goal_reachable && options.unreachable == scene::Unreachable::approach;
@@ -76,6 +78,7 @@ struct Planner::Impl {
   std::vector<HeldPair> scratch;
   scene::Goal goal, sought;                            // `sought` as it came
   scene::Goal waypoint;                                // as a goal
+  Reachability reach;                                  // of the last goal that is no joints'
   Eigen::Vector3d beyond_W = Eigen::Vector3d::Zero();  // from where the arm is sent to a target out of reach
   bool has_goal = false, goal_fits = true, goal_reachable = true, looked = false, asked = false,
        target_is_blocked = false;

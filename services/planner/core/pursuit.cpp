@@ -21,21 +21,26 @@ constexpr double kNearWaypoint = 0.15, kWaypoint_s = 4;  // a waypoint is passed
 
 }  // namespace
 
-// Whether the arm can meet the goal at all, and where to send it if not.
-void Planner::Impl::look_for_a_way(const scene::Goal& wanted) {
-  const bool same = wanted.id == memory.goal_id && wanted.kind == sought.kind &&
-                    wanted.X_WG.p == sought.X_WG.p && wanted.X_WG.R == sought.X_WG.R;
+bool Planner::Impl::fits(const scene::Goal& wanted) const noexcept {
+  if (wanted.kind == scene::GoalKind::joints)
+    return wanted.joints.size() == arm.n() && wanted.joints.allFinite();
+  return wanted.X_WG.p.allFinite() && wanted.X_WG.R.allFinite() && wanted.V_WG.allFinite();
+}
+
+// Where to send an arm that cannot meet the goal.
+void Planner::Impl::pursue(const scene::Goal& wanted, const Reachability& found) {
+  goal = wanted;
+  goal_fits = fits(wanted);
   const bool approaches = options.unreachable == scene::Unreachable::approach;
   if (!goal_fits || wanted.kind == scene::GoalKind::joints) {
     goal_reachable = !goal_fits || !Attraction::beyond_limits(arm, wanted);
     beyond_W.setZero();
     if (!goal_reachable && approaches) Attraction::clamp_to_limits(arm, goal);
     if (goal_fits) pairs.set_goal(arm.chain, goal.joints);
-  } else if (!same || !looked) {
-    const bool moved = looked && wanted.id == memory.goal_id && wanted.kind == sought.kind;
-    const Reachability found = reachability(arm.chain, wanted, options, moved ? &arm.q : nullptr);
-    goal_reachable = found.reachable;
-    beyond_W = found.reachable ? Vector3d(Vector3d::Zero()) : Vector3d(wanted.X_WG.p - found.nearest_W);
+  } else {
+    reach = found;
+    goal_reachable = reach.reachable;
+    beyond_W = reach.reachable ? Vector3d(Vector3d::Zero()) : Vector3d(wanted.X_WG.p - reach.nearest_W);
     looked = true;
   }
   sought = wanted;

@@ -21,6 +21,8 @@ constexpr int kFewStarts = 4;
 constexpr int kStarts = 100, kSteps = 80;
 constexpr double kTurn_m = 0.3;  // so much of a place a radian is worth
 
+thread_local std::uint64_t searched = 0;
+
 /// Inverse kinematics of one goal.
 class Search {
  public:
@@ -61,10 +63,10 @@ class Search {
   }
 
   // Levenberg-Marquardt, every step cut at the limits; a joint at its limit that would go on stays out of it.
-  Vector6d descend(VectorXd& q) {
+  Vector6d descend(VectorXd& q, const std::function<bool()>& stop = {}) {
     Vector6d e = error(q);
     double damping = 1e-2;
-    for (int k = 0; k < kSteps && e.norm() > 1e-4; ++k) {
+    for (int k = 0; k < kSteps && e.norm() > 1e-4 && !(stop && stop()); ++k) {
       const VectorXd dq = step(q, e, damping);
       const VectorXd tried = (q + dq).cwiseMax(low_).cwiseMin(high_);
       const Vector6d left = error(tried);
@@ -110,16 +112,20 @@ class Search {
 
 }  // namespace
 
-Reachability reachability(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& o,
-                          const VectorXd* near) {
+std::uint64_t goals_searched() noexcept { return searched; }
+
+Reachability reachability(const model::Chain& chain, const ReachQuestion& question,
+                          const scene::PlannerOptions& o, const std::function<bool()>& stop) {
+  const scene::Goal& goal = question.goal;
   if (goal.kind == scene::GoalKind::joints) return {};
+  ++searched;
   Search search(chain, goal);
   Reachability out{false, Vector3d::Zero()};
   double least = std::numeric_limits<double>::infinity();
-  const bool begin = near && near->size() == chain.n() && near->allFinite();
-  for (int k = begin ? -1 : 0; k < (begin ? kFewStarts : kStarts); ++k) {
-    VectorXd q = k < 0 ? *near : search.start(k);
-    const Vector6d e = search.descend(q);
+  const bool begin = question.near.size() == chain.n() && question.near.allFinite();
+  for (int k = begin ? -1 : 0; k < (begin ? kFewStarts : kStarts) && !(stop && stop()); ++k) {
+    VectorXd q = k < 0 ? question.near : search.start(k);
+    const Vector6d e = search.descend(q, stop);
     if (e.tail<3>().norm() <= 0.5 * o.goal_tolerance_m &&
         e.head<3>().norm() <= 0.5 * kTurn_m * o.goal_tolerance_rad)
       return {true, goal.X_WG.p};

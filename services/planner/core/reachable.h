@@ -1,11 +1,23 @@
 #pragma once
 /// Whether any configuration meets a goal, and how near one can come.
 
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+
 #include "common/scene/options.h"
 #include "common/scene/scene.h"
 #include "services/planner/core/arm.h"
 
 namespace hamel::planner {
+
+/// Everything the answer depends on, beside chain and options.
+struct ReachQuestion {
+  scene::Goal goal;
+  /// Empty, or a configuration the arm is close to: the search begins there and tries few others, for targets
+  /// that move on.
+  Eigen::VectorXd near = {};
+};
 
 struct Reachability {
   bool reachable = true;
@@ -16,11 +28,13 @@ struct Reachability {
 /// obstacles play no part.  Position and pose goals; goals of joints are reachable within their limits.
 ///
 /// "Not reachable" is a search that failed, no proof; of 2,000 goals that are reachable by construction none
-/// was refused (a test).  Takes 0.1 ms where it is, some milliseconds where it is not: for new goals, not for
-/// cycles.  Allocates.
-/// @param near  may be null; else a configuration the arm is close to: the search begins there and tries few
-///              others, for targets that move on
-Reachability reachability(const model::Chain& chain, const scene::Goal& goal,
-                          const scene::PlannerOptions& options, const Eigen::VectorXd* near = nullptr);
+/// was refused (a test).  Takes 0.1 ms where it is, some milliseconds where it is not, more on a longer arm:
+/// never for the control thread.  Allocates.
+/// @param stop  asked in each step of a search; once it says true the answer means nothing
+Reachability reachability(const model::Chain& chain, const ReachQuestion& question,
+                          const scene::PlannerOptions& options, const std::function<bool()>& stop = {});
+
+/// How many goals this thread has searched for so far: a control thread's number stands still.
+std::uint64_t goals_searched() noexcept;
 
 }  // namespace hamel::planner
