@@ -54,7 +54,8 @@ TYPED_TEST(Recursion, OfForwardDynamicsIsLinear) {
       rbd::place(chain, q.data(), X.data());
       rbd::factorise<G, Counted>(chain, X.data(), nullptr, factor.data());
       // what the motion costs beyond that is in a stage's evaluation, below
-      rbd::solve<G, Counted>(chain, X.data(), factor.data(), q.data(), u.data(), rbd::into(qdd.data()), F.data());
+      rbd::solve<G, Counted>(chain, X.data(), factor.data(), q.data(), u.data(), rbd::into(qdd.data()),
+                             F.data());
     });
   });
 }
