@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <set>
 #include <utility>
 
 #include "clients/hamel/fcl_shapes.h"
@@ -66,6 +67,7 @@ struct Judge::Impl {
     double size_m = 0;  // farthest point from its origin
     double travel_m = 0;
     bool fresh = true;            // not yet looked at
+    bool unheard = true;          // nor ever before
     std::vector<double> due_m{};  // for each body: look again when the two have travelled so far together
   };
   struct SelfPair {
@@ -132,6 +134,7 @@ struct Judge::Impl {
   Eigen::MatrixXd levers;
   std::vector<double> travel_m, step_m;  // of each link: so far, and in this step
   std::vector<Other> others;
+  std::set<std::uint32_t> seen;  // obstacles that were there once
   std::deque<std::pair<double, Eigen::VectorXd>> past;
   double clearance_min_m = kInf;
   Contact contact;
@@ -153,6 +156,7 @@ void Judge::Impl::follow(std::span<const Obstacle> obstacles) {
         old->now.id = ~o.id;
       } else {
         next.push_back({o, o, nullptr});
+        next.back().unheard = seen.insert(o.id).second;
       }
     }
     others = std::move(next);
@@ -226,7 +230,7 @@ bool Judge::Impl::look(double t_s, double share, const Eigen::VectorXd& q) {
       o.due_m[k] = gone(b) + there + budget(d);
       if (d > 0) continue;
       contact = {t_s, b.link < 0 ? "base" : "link " + chain.link(b.link).name, o.now.id, false, false};
-      if (!o.fresh) touch(t_s, q, b, o.solid, X_WO);
+      if (!o.unheard) touch(t_s, q, b, o.solid, X_WO);
       return false;
     }
   }
@@ -296,7 +300,7 @@ const Contact* Judge::Impl::advance(double t_s, const Eigen::VectorXd& q,
   for (std::size_t i = 0; i < step_m.size(); ++i) travel_m[i] += step_m[i];
   for (Other& o : others) {
     o.travel_m += step_of(o.then, o.now, o.size_m);
-    o.fresh = false;
+    o.fresh = o.unheard = false;
   }
   if (!first) past.emplace_back(t_s, q);
   while (past.size() > 2 && past[1].first < t_s - kCausingWithin_s) past.pop_front();

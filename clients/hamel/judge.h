@@ -21,7 +21,7 @@ struct Contact {
   std::uint32_t other = 0;  ///< obstacle id, or for a touch of two links the other shape's link
   bool self = false;
   /// The point of the arm that touches moved toward the obstacle faster than 0.02 m/s within the last 0.1 s;
-  /// between two links always; never with what was nowhere in the state before: a recording may begin with
+  /// between two links always; never with what was never there before: a recording may begin with
   /// somebody where the arm is.
   bool arm_caused = false;
 };

@@ -103,15 +103,16 @@ TEST(Judge, AnArmThatStandsCausesNothing) {
 // A recording may begin with somebody where the arm is.
 TEST(Judge, WhatAppearsWhereAMovingArmIsWasNotRunInto) {
   const std::vector there{test::sphere(3, {0.9, 0, 0}, 0.1)};
-  for (const bool before : {true, false}) {
-    Judge judge(one_link());
-    Eigen::VectorXd q = Eigen::VectorXd::Constant(1, -0.3);
-    for (int k = 0; k < 10; ++k, q[0] += 0.03)
-      judge.advance(0.01 * k, q, std::span(there).first(before ? 1 : 0));
-    const Contact* c = judge.advance(0.1, q, there);
-    ASSERT_NE(c, nullptr);
-    EXPECT_EQ(c->arm_caused, before);
-  }
+  for (const int seen_from : {0, 3, 10})
+    for (const int seen_to : {4, 10}) {  // out of sight for a while is not new
+      Judge judge(one_link());
+      Eigen::VectorXd q = Eigen::VectorXd::Constant(1, -0.3);
+      for (int k = 0; k < 10; ++k, q[0] += 0.03)
+        judge.advance(0.01 * k, q, std::span(there).first(k >= seen_from && k < seen_to ? 1 : 0));
+      const Contact* c = judge.advance(0.1, q, there);
+      ASSERT_NE(c, nullptr);
+      EXPECT_EQ(c->arm_caused, seen_from < 10) << seen_from << " " << seen_to;
+    }
 }
 
 TEST(Judge, FindsTheSmallestDistance) {
