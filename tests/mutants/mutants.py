@@ -82,6 +82,8 @@ MUTANTS = [
            "blocks_test", "*ForwardDynamics*"),
     Mutant("any_drift", "steps that add to a drift are refused", CORE + "marcher.cpp", "kDrift = 0.25,", "kDrift = 0.5,",
            "guards_test", "Ledger.*"),
+    Mutant("endless_drift", "beyond a half of the energy in play nothing adds to a drift", CORE + "marcher.cpp", "kDriftLimit = 0.5,",
+           "kDriftLimit = 5,", "guards_test", "Ledger.RefusesWhat*"),
     Mutant("planar_axis", "planar is spatial", "common/rbd/planar_chain.cpp", "axis.z() < 0 ? -1 : 1", "axis.z() < 0 ? 1 : 1", "planar_test", "*Moves*"),
     Mutant("effort_ignored", "torque is cut at the limit", CORE + "integrator.cpp", "std::clamp(*tau, -limits.effort, limits.effort)", "std::clamp(*tau, -2 * limits.effort, 2 * limits.effort)",
            "integrator_robustness_test", "Limits*"),
