@@ -166,6 +166,16 @@ void add_planar(int n) {
         n);
 }
 
+/// Other libraries; none where ours is built apart, for this processor alone.
+const std::vector<peers::Maker>& others() {
+#ifdef HAMEL_OURS_ALONE
+  static const std::vector<peers::Maker> none;
+  return none;
+#else
+  return peers::makers();
+#endif
+}
+
 void add_peer(const peers::Maker& maker, int n) {
   benchmark::RegisterBenchmark(title("forward", maker.name, n).c_str(), peer_forward, n, maker);
   if (maker.name != "KDL_Vereshchagin")  // shares KDL's
@@ -181,9 +191,7 @@ void add_peer(const peers::Maker& maker, int n) {
 int main(int argc, char** argv) {
   for (const int n : hamel::kJoints) {
     hamel::add_ours(n);
-#ifndef HAMEL_OURS_ALONE
-    for (const auto& maker : hamel::peers::makers()) hamel::add_peer(maker, n);
-#endif
+    for (const auto& maker : hamel::others()) hamel::add_peer(maker, n);
   }
   for (const int n : {3, 4, 7, 30}) hamel::add_planar(n);
   benchmark::Initialize(&argc, argv);
