@@ -1,5 +1,9 @@
 #pragma once
 /// An open chain of rigid links as numbers: what every algorithm reads and none changes.
+///
+/// Every joint of a chain moves.  Fixed joints are lumped by the reader (files::load_urdf): what hangs behind
+/// one counts in the inertia of the moving link that carries it.  A body in the hand is put on by
+/// dynamics::Integrator::set_payload(), a wrench on any link by set_wrench() there, or rbd::add_wrench().
 
 #include <Eigen/Core>
 #include <limits>

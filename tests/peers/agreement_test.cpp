@@ -2,12 +2,8 @@
 // Tolerance: 1e-10 of the norm; where M is inverted, times its condition.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
-#include <algorithm>
-
 #include "common/files/urdf.h"
-#include "common/rbd/rbd.h"
-#include "tests/peers/peer.h"
+#include "tests/peers/compare.h"
 #include "tests/support/chains.h"
 #include "tests/support/data.h"
 
@@ -24,39 +20,6 @@ model::Chain known_to(const Peer& peer, model::ChainSpec spec) {
   return test::checked(std::move(spec));
 }
 
-double condition(const MatrixXd& M) {
-  const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(M).eigenvalues();
-  return values[values.size() - 1] / values[0];
-}
-
-/// One state: all four functions.
-void compare(Peer& peer, const model::Chain& chain, test::Random& rng) {
-  const int n = chain.n();
-  const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 2), qdd = rng.vector(n, 5), tau = rng.vector(n, 10);
-  const VectorXd zero = VectorXd::Zero(n);
-  rbd::Workspace ws(chain);
-  MatrixXd M(n, n), M_peer;
-  rbd::positions(chain, q, ws);
-  rbd::mass_matrix(chain, ws, M);
-  peer.mass_matrix(q, M_peer);
-  EXPECT_LE((M - M_peer).norm(), kTolerance * M.norm());
-
-  VectorXd ours(n), theirs(n);
-  rbd::gravity_torque(chain, ws, ours);
-  peer.inverse_dynamics(q, zero, zero, theirs);
-  EXPECT_LE((ours - theirs).norm(), kTolerance * (theirs.norm() + rbd::energy_scale(chain)));
-
-  rbd::inverse_dynamics(chain, q, qd, qdd, ws, ours);
-  peer.inverse_dynamics(q, qd, qdd, theirs);
-  EXPECT_LE((ours - theirs).norm(), kTolerance * theirs.norm());
-
-  VectorXd damping(n);
-  for (int i = 0; i < n; ++i) damping[i] = chain.joint(i).damping;
-  rbd::forward_dynamics(chain, q, qd, tau, ws, ours);
-  peer.forward_dynamics(q, qd, tau - damping.cwiseProduct(qd), theirs);
-  EXPECT_LE((ours - theirs).norm(), kTolerance * condition(M) * theirs.norm());
-}
-
 class Peers : public testing::TestWithParam<Maker> {
  protected:
   void compare_at(const model::ChainSpec& spec, unsigned seed, int states) {
@@ -64,7 +27,7 @@ class Peers : public testing::TestWithParam<Maker> {
     const model::Chain chain = known_to(*bare, spec);
     const auto peer = GetParam().make(chain);
     test::Random rng(seed);
-    for (int k = 0; k < states; ++k) compare(*peer, chain, rng);
+    for (int k = 0; k < states; ++k) compare(*peer, chain, rng, kTolerance);
   }
 };
 INSTANTIATE_TEST_SUITE_P(Agreement, Peers, testing::ValuesIn(makers()),

@@ -1,5 +1,5 @@
-// Our URDF reader against MuJoCo's, on the same files.  Meshes are absent, so shapes are cut out of the text
-// first.
+// Our URDF reader against those of other libraries, on the same files.  Meshes are absent, so shapes are cut
+// out of the text first.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -7,25 +7,18 @@
 #include <sstream>
 
 #include "common/files/urdf.h"
-#include "common/rbd/rbd.h"
-#include "tests/peers/mujoco_model.h"
-#include "tests/support/chains.h"
+#include "tests/peers/compare.h"
 #include "tests/support/data.h"
 
 namespace hamel::peers {
 namespace {
-
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-constexpr double kTolerance = 1e-8;  // MuJoCo turns an inertia onto its main axes to about 1e-9
 
 std::string without_shapes(const std::filesystem::path& path) {
   std::ifstream in(path);
   std::stringstream all;
   all << in.rdbuf();
   static const std::regex comment("<!--[\\s\\S]*?-->");
-  static const std::regex massless("mass value=\"0(\\.0*)?\"");  // we lump such a link, MuJoCo forgets it
+  static const std::regex massless("mass value=\"0(\\.0*)?\"");  // we lump such a link, others forget it
   const std::string bare =
       std::regex_replace(std::regex_replace(all.str(), comment, ""), massless, "mass value=\"1e-13\"");
   std::string out;
@@ -40,33 +33,25 @@ std::string without_shapes(const std::filesystem::path& path) {
   return out;
 }
 
-TEST(MujocoReadsTheSameRobot, FromTheFile) {
+class Readers : public testing::TestWithParam<Reader> {};
+INSTANTIATE_TEST_SUITE_P(Agreement, Readers, testing::ValuesIn(readers()),
+                         [](const auto& reader) { return reader.param.name; });
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Readers);
+
+TEST_P(Readers, AgreeOnTheFilesOfRobots) {
   HAMEL_NEEDS_DATA("urdf");
-  for (const std::string& file : test::files_in(test::data_folder() / "urdf", ".urdf")) {
+  const auto files = test::files_in(test::data_folder() / "urdf", ".urdf");
+  ASSERT_FALSE(files.empty());
+  for (const std::string& file : files) {
     SCOPED_TRACE(file);
     const auto robot = files::load_urdf(file);
     ASSERT_TRUE(robot) << to_string(robot.error().front());
-    model::ChainSpec spec = robot.value().chain.spec();
-    const int n = static_cast<int>(spec.joints.size());
-    MujocoModel theirs({{"robot.urdf", without_shapes(file)}});
-    theirs.disable_constraints();
-    ASSERT_EQ(theirs.joints(), n);
-    const model::Chain chain = test::checked(spec);
-    rbd::Workspace ws(chain);
+    const model::Chain& chain = robot.value().chain;
+    const auto peer = GetParam().read(without_shapes(file), chain);
+    for (Eigen::Index i = 0; i < peer->damping().size(); ++i)
+      EXPECT_EQ(peer->damping()[i], chain.joint(static_cast<int>(i)).damping) << "joint " << i;
     test::Random rng(11);
-    for (int k = 0; k < 20; ++k) {
-      const VectorXd q = rng.vector(n, 3), qd = rng.vector(n, 2), qdd = rng.vector(n, 5);
-      MatrixXd M(n, n), M_peer;
-      rbd::positions(chain, q, ws);
-      rbd::mass_matrix(chain, ws, M);
-      theirs.mass_matrix(q, M_peer);
-      EXPECT_LE((M - M_peer).norm(), kTolerance * M.norm());
-      VectorXd tau(n), tau_peer, damping(n);
-      for (int i = 0; i < n; ++i) damping[i] = chain.joint(i).damping;
-      rbd::inverse_dynamics(chain, q, qd, qdd, ws, tau);
-      theirs.inverse_dynamics(q, qd, qdd, tau_peer);  // its joints damp, our inverse dynamics leaves that out
-      EXPECT_LE((tau + damping.cwiseProduct(qd) - tau_peer).norm(), kTolerance * tau.norm());
-    }
+    for (int k = 0; k < 20; ++k) compare(*peer, chain, rng, GetParam().tolerance);
   }
 }
 

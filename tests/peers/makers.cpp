@@ -20,4 +20,19 @@ const std::vector<Maker>& makers() {
   return all;
 }
 
+const std::vector<Reader>& readers() {
+  static const std::vector<Reader> all{
+#ifdef HAMEL_WITH_KDL
+      {"KDL", read_kdl, 1e-10},
+#endif
+#ifdef HAMEL_WITH_DART
+      {"DART", read_dart, 1e-10},
+#endif
+#ifdef HAMEL_WITH_MUJOCO
+      {"MuJoCo", read_mujoco, 1e-8},  // it turns an inertia onto its main axes to about 1e-9
+#endif
+  };
+  return all;
+}
+
 }  // namespace hamel::peers

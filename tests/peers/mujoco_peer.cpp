@@ -3,15 +3,19 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
-#include "tests/peers/mujoco_model.h"
 #include "tests/peers/peer.h"
 
 namespace hamel::peers {
 
 namespace {
+
+/// Files in memory; the first is the one that is loaded.
+using MujocoFiles = std::vector<std::pair<std::string, std::string>>;
 
 constexpr int kDepth = 80;  // bodies nested in one file: its XML reader goes down to 100 elements
 
@@ -63,84 +67,85 @@ MujocoFiles translate(const model::Chain& chain) {
   return files;
 }
 
+/// Model and data; constraints, contacts and joint damping are off.
 class Mujoco final : public Peer {
  public:
-  explicit Mujoco(const model::Chain& chain) : model_(translate(chain)) {}
+  explicit Mujoco(const MujocoFiles& files) {
+    const auto vfs = std::make_unique<mjVFS>();
+    mj_defaultVFS(vfs.get());
+    for (const auto& [name, content] : files) {
+      mj_makeEmptyFileVFS(vfs.get(), name.c_str(), static_cast<int>(content.size()));
+      std::memcpy(vfs->filedata[mj_findFileVFS(vfs.get(), name.c_str())], content.data(), content.size());
+    }
+    char why[1000] = "";
+    m_.reset(mj_loadXML(files.front().first.c_str(), vfs.get(), why, sizeof why));
+    mj_deleteVFS(vfs.get());
+    if (!m_) throw std::runtime_error(std::string("MuJoCo: ") + why);
+    d_.reset(mj_makeData(m_.get()));
+    m_->opt.disableflags |= mjDSBL_CONSTRAINT;
+    damping_ = Eigen::Map<VectorXd>(m_->dof_damping, m_->nv);
+    std::fill_n(m_->dof_damping, m_->nv, 0.0);
+  }
   std::string name() const override { return "MuJoCo"; }
+  VectorXd damping() const override { return damping_; }
+  std::string joint(int i) const { return mj_id2name(m_.get(), mjOBJ_JOINT, i); }
+  void set_gravity(const Eigen::Vector3d& g_mps2) { copy(g_mps2, m_->opt.gravity); }
   void inverse_dynamics(const VectorXd& q, const VectorXd& qd, const VectorXd& qdd, VectorXd& tau) override {
-    model_.inverse_dynamics(q, qd, qdd, tau);
+    set(q, qd);
+    copy(qdd, d_->qacc);
+    mj_inverse(m_.get(), d_.get());
+    tau = Eigen::Map<VectorXd>(d_->qfrc_inverse, q.size());
   }
   void forward_dynamics(const VectorXd& q, const VectorXd& qd, const VectorXd& tau, VectorXd& qdd) override {
     set(q, qd);
-    copy(tau, model_.d->qfrc_applied);
-    mj_forward(model_.m, model_.d);
-    qdd = Eigen::Map<VectorXd>(model_.d->qacc, q.size());
+    copy(tau, d_->qfrc_applied);
+    mj_forward(m_.get(), d_.get());
+    qdd = Eigen::Map<VectorXd>(d_->qacc, q.size());
   }
-  void mass_matrix(const VectorXd& q, MatrixXd& M) override { model_.mass_matrix(q, M); }
+  void mass_matrix(const VectorXd& q, MatrixXd& M) override {
+    copy(q, d_->qpos);
+    mj_fwdPosition(m_.get(), d_.get());
+    M.resize(q.size(), q.size());
+    mj_fullM(m_.get(), M.data(), d_->qM);  // symmetric: its rows are our columns
+  }
   std::vector<std::string> steppers() const override { return {"Euler", "RK4", "implicit"}; }
   void begin(const std::string& stepper, const VectorXd& q, const VectorXd& qd, double dt_s) override {
-    model_.m->opt.integrator = stepper == "RK4"        ? mjINT_RK4
-                               : stepper == "implicit" ? mjINT_IMPLICIT
-                                                       : mjINT_EULER;
-    model_.m->opt.timestep = dt_s;
+    m_->opt.integrator = stepper == "RK4" ? mjINT_RK4 : stepper == "implicit" ? mjINT_IMPLICIT : mjINT_EULER;
+    m_->opt.timestep = dt_s;
     set(q, qd);
-    copy(VectorXd::Zero(q.size()), model_.d->qfrc_applied);
+    copy(VectorXd::Zero(q.size()), d_->qfrc_applied);
   }
-  void step() override { mj_step(model_.m, model_.d); }
+  void step() override { mj_step(m_.get(), d_.get()); }
 
  private:
+  struct Free {
+    void operator()(mjModel* m) const { mj_deleteModel(m); }
+    void operator()(mjData* d) const { mj_deleteData(d); }
+  };
   static void copy(const VectorXd& from, mjtNum* to) {
     std::memcpy(to, from.data(), sizeof(double) * static_cast<std::size_t>(from.size()));
   }
   void set(const VectorXd& q, const VectorXd& qd) {
-    copy(q, model_.d->qpos);
-    copy(qd, model_.d->qvel);
+    copy(q, d_->qpos);
+    copy(qd, d_->qvel);
   }
-  MujocoModel model_;
+  std::unique_ptr<mjModel, Free> m_;
+  std::unique_ptr<mjData, Free> d_;
+  VectorXd damping_;
 };
 
 }  // namespace
 
-MujocoModel::MujocoModel(const MujocoFiles& files) {
-  const auto vfs = std::make_unique<mjVFS>();
-  mj_defaultVFS(vfs.get());
-  for (const auto& [name, content] : files) {
-    mj_makeEmptyFileVFS(vfs.get(), name.c_str(), static_cast<int>(content.size()));
-    std::memcpy(vfs->filedata[mj_findFileVFS(vfs.get(), name.c_str())], content.data(), content.size());
-  }
-  char why[1000] = "";
-  m = mj_loadXML(files.front().first.c_str(), vfs.get(), why, sizeof why);
-  mj_deleteVFS(vfs.get());
-  if (m == nullptr) throw std::runtime_error(std::string("MuJoCo: ") + why);
-  d = mj_makeData(m);
+std::unique_ptr<Peer> make_mujoco(const model::Chain& chain) {
+  return std::make_unique<Mujoco>(translate(chain));
 }
-
-MujocoModel::~MujocoModel() {
-  mj_deleteData(d);
-  mj_deleteModel(m);
+std::unique_ptr<Peer> read_mujoco(const std::string& urdf, const model::Chain& chain) {
+  auto peer = std::make_unique<Mujoco>(MujocoFiles{{"robot.urdf", urdf}});
+  if (peer->damping().size() != chain.n()) throw std::runtime_error("MuJoCo reads another robot");
+  for (int i = 0; i < chain.n(); ++i)
+    if (peer->joint(i) != chain.joint(i).name) throw std::runtime_error("MuJoCo reads other joints");
+  peer->set_gravity(chain.gravity_W_mps2());
+  return peer;
 }
-
-int MujocoModel::joints() const { return m->nv; }
-
-void MujocoModel::disable_constraints() { m->opt.disableflags |= mjDSBL_CONSTRAINT; }
-
-void MujocoModel::inverse_dynamics(const VectorXd& q, const VectorXd& qd, const VectorXd& qdd,
-                                   VectorXd& tau) {
-  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(q.size());
-  std::memcpy(d->qpos, q.data(), bytes);
-  std::memcpy(d->qvel, qd.data(), bytes);
-  std::memcpy(d->qacc, qdd.data(), bytes);
-  mj_inverse(m, d);
-  tau = Eigen::Map<VectorXd>(d->qfrc_inverse, q.size());
-}
-
-void MujocoModel::mass_matrix(const VectorXd& q, MatrixXd& M) {
-  std::memcpy(d->qpos, q.data(), sizeof(double) * static_cast<std::size_t>(q.size()));
-  mj_fwdPosition(m, d);
-  M.resize(q.size(), q.size());
-  mj_fullM(m, M.data(), d->qM);  // symmetric: its rows are our columns
-}
-
-std::unique_ptr<Peer> make_mujoco(const model::Chain& chain) { return std::make_unique<Mujoco>(chain); }
 
 }  // namespace hamel::peers

@@ -29,6 +29,8 @@ class Peer {
   virtual void forward_dynamics(const VectorXd& q, const VectorXd& qd, const VectorXd& tau,
                                 VectorXd& qdd) = 0;
   virtual void mass_matrix(const VectorXd& q, MatrixXd& M) = 0;
+  /// Joint damping as read from a file, which the functions above leave out; empty: it reads none.
+  virtual VectorXd damping() const { return {}; }
 
   /// Names of the library's own integrators; begin() chooses one, step() advances by its dt.
   virtual std::vector<std::string> steppers() const { return {}; }
@@ -45,11 +47,24 @@ struct Maker {
 const std::vector<Maker>& makers();
 inline std::ostream& operator<<(std::ostream& out, const Maker& maker) { return out << maker.name; }
 
+/// Builders by the libraries' own readers from the text of a URDF without shapes.  They throw where the
+/// joints are not the chain's, in order; of the chain nothing else is used but its gravity.
+struct Reader {
+  std::string name;
+  std::unique_ptr<Peer> (*read)(const std::string& urdf, const model::Chain& chain);
+  double tolerance;  ///< as well as the library keeps the file's numbers
+};
+const std::vector<Reader>& readers();
+inline std::ostream& operator<<(std::ostream& out, const Reader& reader) { return out << reader.name; }
+
 std::unique_ptr<Peer> make_kdl(const model::Chain& chain);  ///< Newton-Euler, M by composite bodies, LDL
 std::unique_ptr<Peer> make_kdl_vereshchagin(const model::Chain& chain);  ///< forward dynamics in O(n)
 std::unique_ptr<Peer> make_dart(const model::Chain& chain);
 std::unique_ptr<Peer> make_mujoco(const model::Chain& chain);
 std::unique_ptr<Peer> make_simbody(const model::Chain& chain);
+std::unique_ptr<Peer> read_kdl(const std::string& urdf, const model::Chain& chain);
+std::unique_ptr<Peer> read_dart(const std::string& urdf, const model::Chain& chain);
+std::unique_ptr<Peer> read_mujoco(const std::string& urdf, const model::Chain& chain);
 
 /// Pose of link i's frame in link i-1's at q = 0, the base's own pose included.
 inline lie::Pose joint_pose(const model::Chain& chain, int i) {

@@ -7,6 +7,7 @@
 
 #include "common/rbd/rbd.h"
 #include "services/dynamics/core/integrator.h"
+#include "services/dynamics/core/marcher.h"
 #include "services/dynamics/core/midpoint.h"
 #include "tests/support/chains.h"
 
@@ -162,6 +163,38 @@ TEST(Ledger, KeepsFastRodsFromDrifting) {
     }
     EXPECT_TRUE(said) << dt;
   }
+}
+
+/// The same state, had the steps up to it made up so much.
+State having_made_up(double energy_J, State s) {
+  s.history[s.history.size() - Ledger::kSize] = energy_J;
+  return s;
+}
+
+// At a half, steps that add are refused, however short their parts and good the step; those that take away
+// are not, and before a half none is.
+TEST(Ledger, RefusesWhatAddsBeyondAHalf) {
+  const model::Chain chain = test::fast_rods();
+  Integrator integrator(chain, {.dt_s = 2e-3});
+  const VectorXd zero = VectorXd::Zero(3);
+  State s = integrator.start(zero, zero);
+  int refused = 0, taken = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double measure = in_play(s, chain);
+    for (const double sign : {-1, 1}) {
+      State before_half = having_made_up(sign * 0.49 * measure, s);
+      State at_half = having_made_up(sign * 0.5 * (1 + 1e-9) * measure, s);
+      EXPECT_TRUE(integrator.step(before_half, zero).usable()) << k;
+      const StepReport report = integrator.step(at_half, zero);
+      report.usable() ? ++taken : ++refused;
+      if (report.usable() && report.substeps == 1) {
+        EXPECT_LE(sign * report.energy_error_J, 0) << k;
+      }
+    }
+    ASSERT_TRUE(integrator.step(s, zero).usable()) << k;
+  }
+  EXPECT_GT(refused, 150);
+  EXPECT_GT(taken, 250);
 }
 
 }  // namespace
