@@ -1,5 +1,6 @@
 #pragma once
-/// One end of a topic, as our bus makes it or a plain program of a vendor: for laws that hold between any two.
+/// One end of a topic, as our bus makes it or a plain program of a vendor: for laws that hold between any
+/// two.
 
 #include <cstdint>
 #include <memory>

@@ -16,7 +16,9 @@ void set_number(hamel_v1_TorqueCommand& m, std::uint32_t n) { m.step = n; }
 
 dds_entity_t participant(unsigned domain) {
   setenv("CYCLONEDDS_URI", "file://" HAMEL_SOURCE_DIR "/deploy/qos/cyclonedds.xml", 1);
-  return dds_create_participant(domain, nullptr, nullptr);
+  const dds_entity_t made = dds_create_participant(domain, nullptr, nullptr);
+  if (made < 0) throw std::runtime_error("Cyclone DDS refuses deploy/qos/cyclonedds.xml");
+  return made;
 }
 
 /// A participant with a topic, configured as deploy/qos says.

@@ -29,15 +29,17 @@ Duration_t duration_of(long ms) { return Duration_t(static_cast<long double>(ms)
 
 dds::DomainParticipant* participant(unsigned domain) {
   setenv("FASTRTPS_DEFAULT_PROFILES_FILE", HAMEL_SOURCE_DIR "/deploy/qos/fastdds.xml", 1);
-  return dds::DomainParticipantFactory::get_instance()->create_participant_with_profile(domain, "hamel");
+  auto* made =
+      dds::DomainParticipantFactory::get_instance()->create_participant_with_profile(domain, "hamel");
+  if (made == nullptr) throw std::runtime_error("deploy/qos/fastdds.xml has no profile hamel");
+  return made;
 }
 
 /// What fits a topic, to begin with: the profile of its delivery in deploy/qos.
-const char* profile(const Topic& topic) {
-  return topic.delivery == Delivery::latched ? "latched" : "stream";
-}
+const char* profile(const Topic& topic) { return topic.delivery == Delivery::latched ? "latched" : "stream"; }
 void expect(ReturnCode_t code) {
-  if (code != ReturnCode_t::RETCODE_OK) throw std::runtime_error("deploy/qos/fastdds.xml has no such profile");
+  if (code != ReturnCode_t::RETCODE_OK)
+    throw std::runtime_error("deploy/qos/fastdds.xml has no such profile");
 }
 
 /// A participant with a topic, configured as deploy/qos says.
