@@ -267,9 +267,10 @@ class FastNode final : public Node {
   std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
     // Fast DDS's receiving threads wait for its locks: they are faster where the owner sleeps.
-    return inbound_.wait(deadline, {}, [this](const Disagreement& d) {
-      complaints_.tell(d, Vendor::fastdds, endpoints(), options_.log);
-    });
+    return inbound_.wait(
+        deadline, {},
+        [this](const Disagreement& d) { complaints_.tell(d, Vendor::fastdds, endpoints(), options_.log); },
+        [this] { complaints_.look(Vendor::fastdds, endpoints(), options_.log); });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
@@ -288,6 +289,8 @@ class FastNode final : public Node {
       type.register_type(participant_);
       made =
           participant_->create_topic(std::string(topic.name), type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+      complaints_.watch(topic);
+      inbound_.ends_changed();
     }
     return checked(made, "topic", topic);
   }
@@ -296,7 +299,7 @@ class FastNode final : public Node {
   const ParticipantNumber number_;
   Inbound inbound_;
   Complaints complaints_;
-  Neighbours neighbours_;
+  Neighbours neighbours_{inbound_};
   std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
   std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
   std::map<std::string_view, dds::Topic*> topics_;

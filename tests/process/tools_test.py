@@ -119,6 +119,44 @@ class Arms(unittest.TestCase):
         self.assertIn("arm 1", done.stderr)
 
 
+class Strangers(unittest.TestCase):
+    """A peer that a service cannot work with stands in one line of the service's log and in `hamel status`."""
+
+    def named(self, vendor, domain, kind, *words):
+        stranger = subprocess.Popen([os.environ["HAMEL_STRANGER"], vendor, str(domain), kind], stdin=subprocess.PIPE)
+        planner = subprocess.Popen([BIN / "hamel-planner", scene("four_link_avoid"), "--bus", vendor, "--domain", str(domain)],
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            end, out = time.monotonic() + 30, ""
+            while time.monotonic() < end and not all(w in out for w in words):
+                _, out, _ = hamel("status", "--bus", vendor, "--domain", domain, "--seconds", 1)
+            for word in words:
+                self.assertIn(word, out)
+        finally:
+            stranger.communicate()
+            planner.terminate()
+            log = planner.communicate(timeout=20)[1].splitlines()
+        self.assertEqual(sum(all(w in line for w in words) for line in log), 1, log)
+        return out
+
+    def test_of_another_type(self):
+        for i, vendor in enumerate(("fastdds", "cyclonedds")):
+            with self.subTest(vendor):
+                self.named(vendor, 60 + i, "type", "hamel/v1/goal", "the writer of stranger", "elsewhere::Goal", "hamel::v1::Goal")
+
+    def test_of_another_qos(self):
+        for i, vendor in enumerate(("fastdds", "cyclonedds")):
+            with self.subTest(vendor):
+                self.named(vendor, 62 + i, "qos", "hamel/v1/status", "durability", "the writer of stranger", "volatile", "transient-local")
+
+    def test_of_another_idl(self):
+        for i, vendor in enumerate(("fastdds", "cyclonedds")):
+            with self.subTest(vendor):
+                out = self.named(vendor, 64 + i, "idl", "planner of arm 9 is 9.9 with IDL of-elsewhere")
+                self.assertIn("other IDL: of-elsewhere", out)
+                self.assertIn("degraded", out.lower())
+
+
 class RealTime(unittest.TestCase):
     def test_a_request_is_granted_or_refused_with_its_remedy(self):
         for options, remedy in ((["--priority", "50"], "RTPRIO"), (["--lock-memory"], "MEMLOCK"), (["--cpu", "999"], "taskset")):
