@@ -65,7 +65,7 @@ std::uint32_t key_in(const Payload& p) {
 }
 
 /// Another stranger's: more keys than Fast DDS is let keep, each said once; then it stays.
-constexpr std::uint32_t kHorde = 70'000;
+constexpr std::uint32_t kHorde = 90'000;
 [[noreturn]] void swarm(Vendor vendor, std::uint32_t domain) {
   const auto node = open(vendor, domain);
   const auto command = node->writer(topics::kCommand);
