@@ -79,6 +79,11 @@ void look_at_interfaces(const runtime::BusOptions& o, Findings& out) {
   for (const auto& [name, f] : flags) {
     const bool up = (f & IFF_UP) != 0, multicast = (f & IFF_MULTICAST) != 0, lo = (f & IFF_LOOPBACK) != 0;
     loopback |= lo && up;
+    if (up && (f & IFF_RUNNING) == 0) {  // what comes back then never was on the cable
+      out.push_back({Verdict::note, "interface " + name,
+                     "is up, but nothing is at the other end of its cable", "ip -brief link"});
+      continue;
+    }
     const std::string mode = lo          ? "used unless --interface names another"
                              : multicast ? "multicast discovery"
                                          : "no multicast: give every host as --peer";

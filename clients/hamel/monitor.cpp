@@ -17,6 +17,7 @@ using namespace std::chrono_literals;
 namespace {
 constexpr auto kPatience = 20s;     // nothing heard for so long: the run is lost
 constexpr auto kLastWords = 500ms;  // after the final summary, for the last report
+constexpr auto kHeard = 200ms;      // so long after its last word no other of the same arm is heard
 constexpr std::size_t kRowsWaiting = 200;
 constexpr std::size_t kMostOutages = 1000;
 }  // namespace
@@ -86,6 +87,21 @@ std::optional<Problem> CsvWriter::finish() {
   return std::nullopt;
 }
 
+bool Heard::takes(const bus::WriterId& from, runtime::Clock::time_point now, bool continues) {
+  if (writer_ && from != *writer_ && !continues) {
+    other_ = from;
+    return false;
+  }
+  writer_ = from;
+  last_ = now;
+  return true;
+}
+
+void Heard::settle(runtime::Clock::time_point now) {
+  if (other_ && now - last_ > kHeard) writer_ = other_;
+  other_.reset();
+}
+
 Monitor::Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, std::unique_ptr<CsvWriter> csv,
                  bool live)
     : scene_(scene),
@@ -103,15 +119,9 @@ Monitor::Monitor(bus::Node& node, const scene::Scene& scene, scene::Pace pace, s
 
 bool Monitor::poll(Time now) {
   const auto before = states_ + reports_;
-  take_reports();
+  take_reports(now);
   take_states(now);
-  wire::RunSummary s;
-  while (summary_in_.take(s)) {
-    if (s.arm != scene_.arm) continue;
-    if (s.final_summary && !(summary_ && summary_->final_summary)) final_heard_ = now;
-    summary_ = s;
-    last_heard_ = now;
-  }
+  take_summaries(now);
   write_rows(false);
   const bool heard = states_ + reports_ != before;
   if (heard) last_heard_ = now;
@@ -162,20 +172,44 @@ void Monitor::take_states(Time now) {
   wire::ArmState s;
   while (state_in_.take(s)) {
     if (s.arm != scene_.arm || s.position.size() != scene_.robot.chain.n()) continue;
-    const bool repeated = state_ && s.incarnation == state_->incarnation && s.step <= state_->step;
-    if (repeated) continue;
-    if (state_ && s.incarnation == state_->incarnation) rows_lost_ += s.step - state_->step - 1;
+    const bool same = state_ && s.incarnation == state_->incarnation;
+    // Started again, it goes on: in lockstep, where all count their incarnations from one, with the next
+    // step.
+    const bool continues = same && (pace_ == scene::Pace::realtime || s.step - state_->step <= 1);
+    if (!arm_.takes(state_in_.from(), now, continues)) continue;
+    if (same && s.step <= state_->step) continue;  // repeated
+    if (same) rows_lost_ += s.step - state_->step - 1;
+    if (state_ && !same) begin_anew();
     ++states_;
     follow(s, now);
     state_ = s;
     if (csv_) rows_.push_back(s);
   }
+  arm_.settle(now);
 }
 
-void Monitor::take_reports() {
+/// Another incarnation: its time is not that of the one before.
+void Monitor::begin_anew() {
+  silent_since_s_.reset();
+  blind_since_s_.reset();
+  summary_.reset();
+}
+
+/// Of the arm that is followed.
+void Monitor::take_summaries(Time now) {
+  wire::RunSummary s;
+  while (summary_in_.take(s)) {
+    if (s.arm != scene_.arm || (state_ && s.incarnation != state_->incarnation)) continue;
+    if (s.final_summary && !(summary_ && summary_->final_summary)) final_heard_ = now;
+    summary_ = s;
+    last_heard_ = now;
+  }
+}
+
+void Monitor::take_reports(Time now) {
   wire::PlannerReport r;
   while (report_in_.take(r)) {
-    if (r.arm != scene_.arm) continue;
+    if (r.arm != scene_.arm || !planner_.takes(report_in_.from(), now)) continue;
     // When the run is over the planner hears no more states and says so: that is not how the run went.
     if (summary_ && summary_->final_summary && r.reason == wire::Reason::stale_state) continue;
     ++reports_;
@@ -190,6 +224,7 @@ void Monitor::take_reports() {
     report_ = std::move(r);
     write_rows(false);
   }
+  planner_.settle(now);
 }
 
 /// A row waits for the report of its step: states and reports come from different writers.

@@ -58,6 +58,21 @@ class CsvWriter {
   int links_ = 0;  ///< with columns of their own
 };
 
+/// Of several writers that speak for one arm (two networks on one domain), the one that is heard: the first,
+/// until it has been silent for a while.
+class Heard {
+ public:
+  /// Whether what `from` wrote counts.  `continues`: it goes on where the one that was heard stopped.
+  bool takes(const bus::WriterId& from, runtime::Clock::time_point now, bool continues = false);
+  /// All that waited has been taken: where nothing of the one that is heard was among it for long, another
+  /// takes its place.
+  void settle(runtime::Clock::time_point now);
+
+ private:
+  std::optional<bus::WriterId> writer_, other_;
+  runtime::Clock::time_point last_{};
+};
+
 class Monitor final : public runtime::Service {
  public:
   /// `live`: a status line on stderr.  `csv` may be null.
@@ -76,8 +91,10 @@ class Monitor final : public runtime::Service {
  private:
   using Time = runtime::Clock::time_point;
   void take_states(Time now);
-  void take_reports();
+  void take_reports(Time now);
+  void take_summaries(Time now);
   void follow(const wire::ArmState& s, Time now);
+  void begin_anew();
   void outage(const char* service, double t_s, double length_s);
   void write_rows(bool all);
   void show(Time now);
@@ -91,6 +108,7 @@ class Monitor final : public runtime::Service {
   const bool live_;
   rbd::Workspace ws_;
 
+  Heard arm_, planner_;
   std::optional<wire::ArmState> state_;
   std::optional<wire::PlannerReport> report_;
   std::optional<wire::RunSummary> summary_;

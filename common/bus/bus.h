@@ -68,7 +68,7 @@ struct Counters {
   std::uint64_t lost = 0;          ///< the bus says it dropped these
   std::uint64_t refused = 0;       ///< larger than Topic::max_bytes, or an unknown encapsulation
   std::uint64_t incompatible = 0;  ///< peers whose QoS cannot match ours (each also logged once)
-  std::uint64_t disposed = 0;      ///< keys whose writers took them back, or left
+  std::uint64_t disposed = 0;      ///< keys whose writers took them back, or left (Fast DDS: unregistered)
   std::uint64_t late = 0;          ///< Ask::promises: periods of the topic's staleness without a sample
   std::uint64_t silent = 0;        ///< Ask::promises: times a writer stopped saying that it lives
 };

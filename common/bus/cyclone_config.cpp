@@ -49,7 +49,9 @@ std::string configuration(const NodeOptions& options, const Interface& interface
   const std::string secured =
       options.security.empty() ? "" : security(find_identity(options.security).value());
   // A writer waits for slow readers above this mark; keep-last already bounds what it holds.
-  const std::string internal = element("Watermarks", element("WhcHigh", "1GB"));
+  // Without the hash of a key, Fast DDS takes what ends an instance for the end of another (see from_key).
+  const std::string internal =
+      element("Watermarks", element("WhcHigh", "1GB")) + element("GenerateKeyhash", "true");
   return element("CycloneDDS",
                  element("Domain", element("General", general) + element("Discovery", discovery) +
                                        element("Internal", internal) + secured));

@@ -118,11 +118,14 @@ ddsi_serdata* from_vectors(const ddsi_sertype* type, ddsi_serdata_kind kind, dds
   return admitted(finish(s));
 }
 
-/// A key alone, as it stands in dispose messages.
+/// A key alone, as it stands in dispose messages.  Fast DDS 2.9 takes one of up to 16 bytes, header and all,
+/// for the key's hash, and so for another instance; what is longer it passes over, and looks at the hash that
+/// stands beside it (GenerateKeyhash).
 ddsi_serdata* from_key(const ddsi_sertype* type, std::span<const std::byte, kKeyBytes> key) {
-  Sample* s = make(type, SDK_KEY, kKeySample, kKeySample);
+  constexpr std::size_t kLonger = 20;
+  Sample* s = make(type, SDK_KEY, kLonger, kLonger);
   if (s == nullptr) return nullptr;
-  std::memset(s->bytes(), 0, kHeaderBytes);  // 0, 0: big endian
+  std::memset(s->bytes(), 0, kLonger);  // the header's 0, 0: big endian
   std::memcpy(s->bytes() + kHeaderBytes, key.data(), kKeyBytes);
   return finish(s);
 }

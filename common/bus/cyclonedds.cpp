@@ -7,11 +7,13 @@
 #include <cstring>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <variant>
 
 #include "common/bus/backends.h"
 #include "common/bus/cyclone_config.h"
+#include "common/bus/cyclone_directory.h"
 #include "common/bus/cyclone_sertype.h"
 #include "common/bus/events.h"
 #include "common/bus/payload.h"
@@ -244,59 +246,6 @@ class CycloneReader final : public Reader {
   std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0;
 };
 
-/// Everything that waits in a reader of a built-in topic, as T, each freed after its use.
-template <class T, class Use>
-void read_builtin(dds_entity_t participant, dds_entity_t topic, Use use) {
-  const dds_entity_t reader = dds_create_reader(participant, topic, nullptr, nullptr);
-  if (reader < 0) return;
-  void* sample = nullptr;
-  dds_sample_info_t info;
-  while (dds_take(reader, &sample, &info, 1, 1) == 1) {
-    if (info.valid_data && info.instance_state == DDS_IST_ALIVE) use(*static_cast<const T*>(sample));
-    dds_return_loan(reader, &sample, 1);
-  }
-  dds_delete(reader);
-}
-
-WriterId id_of(const dds_guid_t& guid) {
-  WriterId id;
-  std::copy_n(guid.v, id.size(), id.begin());
-  return id;
-}
-
-std::string name_of(const dds_builtintopic_participant_t& p) {
-  char* name = nullptr;
-  if (!dds_qget_entity_name(p.qos, &name) || name == nullptr) return {};
-  std::string out = name;
-  dds_free(name);
-  return out;
-}
-
-std::chrono::microseconds finite(dds_duration_t ns) {
-  return std::chrono::microseconds(ns == DDS_INFINITY ? 0 : (ns + 500) / 1000);
-}
-
-Endpoint endpoint_of(const dds_builtintopic_endpoint_t& e, bool writes) {
-  Endpoint out{.topic = e.topic_name, .type = e.type_name, .writes = writes};
-  dds_reliability_kind_t reliability = DDS_RELIABILITY_BEST_EFFORT;
-  dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE;
-  dds_ownership_kind_t ownership = DDS_OWNERSHIP_SHARED;
-  dds_liveliness_kind_t liveliness = DDS_LIVELINESS_AUTOMATIC;
-  dds_duration_t blocking = 0, deadline = DDS_INFINITY, lease = DDS_INFINITY;
-  dds_qget_deadline(e.qos, &deadline);
-  dds_qget_liveliness(e.qos, &liveliness, &lease);
-  out.deadline = finite(deadline);
-  out.liveliness = finite(lease);
-  dds_qget_reliability(e.qos, &reliability, &blocking);
-  dds_qget_durability(e.qos, &durability);
-  dds_qget_ownership(e.qos, &ownership);
-  out.reliable = reliability == DDS_RELIABILITY_RELIABLE;
-  out.latched = durability != DDS_DURABILITY_VOLATILE;
-  out.exclusive = ownership == DDS_OWNERSHIP_EXCLUSIVE;
-  out.id = id_of(e.key);
-  return out;
-}
-
 dds_entity_t checked(dds_entity_t made, const char* what, const Topic& topic) {
   if (made >= 0) return made;
   throw std::runtime_error(std::string(what) + " for topic " + std::string(topic.name) + ": " +
@@ -315,6 +264,7 @@ class CycloneNode final : public Node {
     const Qos qos(dds_create_qos());
     dds_qset_entity_name(qos.get(), options_.name.c_str());
     participant_ = dds_create_participant(options_.domain, qos.get(), nullptr);
+    if (participant_ > 0) directory_.emplace(participant_, inbound_);
     return participant_;
   }
 
@@ -336,34 +286,14 @@ class CycloneNode final : public Node {
                                            topic_for(topic).keys);
   }
 
-  std::vector<Endpoint> endpoints() override {
-    std::vector<std::pair<WriterId, Endpoint>> ends;  // with their participants
-    for (const bool writes : {true, false})
-      read_builtin<dds_builtintopic_endpoint_t>(
-          participant_, writes ? DDS_BUILTIN_TOPIC_DCPSPUBLICATION : DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION,
-          [&](const auto& e) { ends.emplace_back(id_of(e.participant_key), endpoint_of(e, writes)); });
-    // Read last: Cyclone finds a participant before its ends.
-    std::map<WriterId, std::string> names;
-    read_builtin<dds_builtintopic_participant_t>(participant_, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT,
-                                                 [&](const auto& p) { names[id_of(p.key)] = name_of(p); });
-    dds_guid_t own{};
-    dds_get_guid(participant_, &own);
-    names.erase(id_of(own));
-    std::vector<Endpoint> all;
-    for (auto& [participant, end] : ends) {
-      const auto name = names.find(participant);
-      if (name == names.end()) continue;  // our own, or gone meanwhile
-      end.participant = name->second;
-      all.push_back(std::move(end));
-    }
-    return all;
-  }
+  std::vector<Endpoint> endpoints() override { return directory_->others(); }
   std::uint64_t incompatible() const override { return inbound_.incompatible(); }
   std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
-    return inbound_.wait(deadline, options_.awake, [this](const Disagreement& d) {
-      complaints_.tell(d, Vendor::cyclonedds, endpoints(), options_.log);
-    });
+    return inbound_.wait(
+        deadline, options_.awake,
+        [this](const Disagreement& d) { complaints_.tell(d, Vendor::cyclonedds, endpoints(), options_.log); },
+        [this] { complaints_.look(Vendor::cyclonedds, endpoints(), options_.log); });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
@@ -376,7 +306,11 @@ class CycloneNode final : public Node {
 
   const cyclone::CycloneTopic& topic_for(const Topic& topic) {
     cyclone::CycloneTopic& made = topics_[topic.name];
-    if (made.entity <= 0) made = cyclone::create_topic(participant_, topic);
+    if (made.entity <= 0) {
+      made = cyclone::create_topic(participant_, topic);
+      complaints_.watch(topic);
+      inbound_.ends_changed();
+    }
     checked(made.entity, "topic", topic);
     return made;
   }
@@ -387,6 +321,7 @@ class CycloneNode final : public Node {
   Complaints complaints_;
   std::vector<std::unique_ptr<Events>> events_;  // until the participant is gone
   std::map<std::string_view, cyclone::CycloneTopic> topics_;
+  std::optional<cyclone::Directory> directory_;
   dds_entity_t participant_ = 0;
 };
 

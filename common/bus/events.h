@@ -13,10 +13,14 @@
 
 namespace hamel::bus {
 
-/// The notifier of a node, and the disagreements that its owner has not told yet.
+/// The notifier of a node, and what its owner has not told or looked at yet.
 class Inbound {
  public:
   Notifier notifier;
+
+  /// Others have ends that they had not, or we a topic more.  Wakes nobody: the owner looks when it has
+  /// waited.
+  void ends_changed() noexcept { changed_ = true; }
 
   void disagree(const Disagreement& d) {
     {
@@ -29,10 +33,13 @@ class Inbound {
   void count(std::int32_t change) { incompatible_ += static_cast<std::uint64_t>(std::max(change, 0)); }
   std::uint64_t incompatible() const { return incompatible_; }
 
-  /// Waits as Node::wait() does, then tells what is untold to `tell(Disagreement)`.
-  template <class Tell>
-  bool wait(std::chrono::steady_clock::time_point deadline, std::chrono::microseconds awake, Tell tell) {
+  /// Waits as Node::wait() does, then tells what is untold to `tell(Disagreement)`, and has the owner
+  /// `look()` where ends have changed, twice a second at most.
+  template <class Tell, class Look>
+  bool wait(std::chrono::steady_clock::time_point deadline, std::chrono::microseconds awake, Tell tell,
+            Look look) {
     const bool woken = notifier.wait(deadline, awake);
+    if (changed_ && due()) look();
     if (!any_.exchange(false)) return woken;
     std::vector<Disagreement> untold;
     {
@@ -44,7 +51,16 @@ class Inbound {
   }
 
  private:
-  std::atomic<bool> any_{false};
+  bool due() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - looked_ < std::chrono::milliseconds(500)) return false;
+    looked_ = now;
+    changed_ = false;
+    return true;
+  }
+
+  std::atomic<bool> any_{false}, changed_{false};
+  std::chrono::steady_clock::time_point looked_{};
   std::atomic<std::uint64_t> incompatible_{0};
   std::mutex mutex_;
   std::vector<Disagreement> untold_;

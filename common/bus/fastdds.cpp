@@ -3,9 +3,7 @@
 /// Fast DDS's threads call the listeners; those live until the participant is gone, so that a callback still
 /// on its way when a reader or writer leaves finds them in place.
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/config.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <atomic>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -17,25 +15,20 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <map>
 #include <mutex>
-#include <random>
 #include <set>
 #include <stdexcept>
 #include <variant>
 
 #include "common/bus/backends.h"
 #include "common/bus/fastdds_events.h"
+#include "common/bus/fastdds_participant.h"
 #include "common/bus/fastdds_type.h"
 #include "common/bus/network.h"
 
 namespace hamel::bus {
 namespace {
 
-using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
-
-Duration_t duration(std::chrono::milliseconds ms) {
-  return Duration_t(static_cast<long double>(ms.count()) * 1e-3L);
-}
 
 /// A late Cyclone reader waits for the writer's next heartbeat, and so does what was lost on the way: it must
 /// be repeated before a command is stale.  Fast DDS's default is 3 s.
@@ -70,9 +63,9 @@ void promise(Qos& qos, const Topic& topic, std::chrono::milliseconds more = {}) 
 
 /// Instances that Fast DDS is let keep, of which a reader hears kMaxInstances.  Where there are no more to be
 /// had, 2.9 makes room by dropping one of which nothing waits, and ends the program (an assertion of its own)
-/// when a sample of that one is on its way: so many that no peer comes there by mistake, and what a hostile
-/// one can fill with them is tens of megabytes.
-constexpr int kVendorInstances = 1 << 16;
+/// when a sample of that one is on its way; nor can one be taken back, or a writer be ignored.  So a reader
+/// that has seen kStrangers keys that it does not hear is replaced by a new one, long before it comes there.
+constexpr int kVendorInstances = 1 << 16, kStrangers = 1 << 12;
 
 dds::DataReaderQos reader_qos(const Topic& topic, int depth, Ask ask) {
   auto qos = common_qos<dds::DataReaderQos>(topic, depth > 0 ? depth : depth_of(topic.delivery));
@@ -125,22 +118,30 @@ class FastWriter final : public Writer {
 
 class FastReader final : public Reader {
  public:
-  FastReader(const Topic& topic, dds::Subscriber& subscriber, dds::DataReader& reader, ReaderEvents& events,
-             const Neighbours& neighbours)
-      : topic_(topic), subscriber_(subscriber), reader_(reader), events_(events), neighbours_(neighbours) {}
-  ~FastReader() override {
-    reader_.set_listener(nullptr);
-    subscriber_.delete_datareader(&reader_);
-  }
+  /// Null inside where Fast DDS refuses.
+  FastReader(const Topic& topic, dds::Topic& described, dds::DataReaderQos qos, dds::Subscriber& subscriber,
+             ReaderEvents& events, const Neighbours& neighbours)
+      : topic_(topic),
+        described_(described),
+        qos_(std::move(qos)),
+        subscriber_(subscriber),
+        events_(events),
+        neighbours_(neighbours),
+        reader_(subscriber.create_datareader(&described, qos_, &events)) {}
+  ~FastReader() override { leave(); }
+  bool made() const { return reader_ != nullptr; }
 
   bool take(Payload& payload) override {
     if (!events_.waits.exchange(false)) return false;
+    if (strangers_.size() >= kStrangers) renew();
+    if (reader_ == nullptr) return false;
     RawSample sample{{}, &payload, 0};
     dds::SampleInfo info;
     for (int i = 0; i < kPassedOver; ++i) {
-      if (reader_.take_next_sample(&sample, &info) != ReturnCode_t::RETCODE_OK) return false;
+      if (reader_->take_next_sample(&sample, &info) != ReturnCode_t::RETCODE_OK) return false;
       if (!info.valid_data) {  // an instance's state changed
         ++disposed_;
+        if (!heard_.contains(info.instance_handle)) strangers_.insert(info.instance_handle);
         continue;
       }
       from_ = info.sample_identity.writer_guid();
@@ -176,24 +177,44 @@ class FastReader final : public Reader {
     }
     if (heard_.size() >= kMaxInstances && passed_over_ % kMaxInstances == 0)
       std::erase_if(heard_, [this](const auto& k) { return !neighbours_.know(k.second); });
-    return heard_.size() < kMaxInstances && heard_.emplace(key, from_).second;
+    if (heard_.size() < kMaxInstances) return heard_.emplace(key, from_).second;
+    strangers_.insert(key);
+    return false;
+  }
+
+  void leave() {
+    if (reader_ == nullptr) return;
+    reader_->set_listener(nullptr);
+    subscriber_.delete_datareader(reader_);
+  }
+  /// What waits in the old reader is lost, and what is written until the writers have found the new one.
+  void renew() {
+    leave();
+    strangers_.clear();
+    events_.matched = 0;
+    reader_ = subscriber_.create_datareader(&described_, qos_, &events_);
   }
 
   const Topic& topic_;
+  dds::Topic& described_;
+  const dds::DataReaderQos qos_;
   dds::Subscriber& subscriber_;
-  dds::DataReader& reader_;
   ReaderEvents& events_;
   const Neighbours& neighbours_;
+  dds::DataReader* reader_;
   rtps::GUID_t from_;
   std::map<dds::InstanceHandle_t, rtps::GUID_t> heard_;  ///< and who wrote each last
+  std::set<dds::InstanceHandle_t> strangers_;            ///< keys that are not
   std::uint64_t samples_ = 0, refused_ = 0, disposed_ = 0, passed_over_ = 0;
 };
 
+[[noreturn]] void refused(const char* what, const Topic& topic) {
+  throw std::runtime_error("Fast DDS refused to create a " + std::string(what) + " for topic " +
+                           std::string(topic.name));
+}
 template <class T>
 T& checked(T* made, const char* what, const Topic& topic) {
-  if (made == nullptr)
-    throw std::runtime_error("Fast DDS refused to create a " + std::string(what) + " for topic " +
-                             std::string(topic.name));
+  if (made == nullptr) refused(what, topic);
   return *made;
 }
 
@@ -256,10 +277,10 @@ class FastNode final : public Node {
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     auto& events = keep(reader_events_, std::make_unique<ReaderEvents>(topic, inbound_, false, ask));
-    auto& made =
-        checked(subscriber_->create_datareader(&topic_for(topic), reader_qos(topic, depth, ask), &events),
-                "reader", topic);
-    return std::make_unique<FastReader>(topic, *subscriber_, made, events, neighbours_);
+    auto reader = std::make_unique<FastReader>(topic, topic_for(topic), reader_qos(topic, depth, ask),
+                                               *subscriber_, events, neighbours_);
+    if (!reader->made()) refused("reader", topic);
+    return reader;
   }
 
   std::vector<Endpoint> endpoints() override { return neighbours_.all(); }
@@ -267,9 +288,10 @@ class FastNode final : public Node {
   std::string complaint() const override { return complaints_.last(); }
   bool wait(std::chrono::steady_clock::time_point deadline) override {
     // Fast DDS's receiving threads wait for its locks: they are faster where the owner sleeps.
-    return inbound_.wait(deadline, {}, [this](const Disagreement& d) {
-      complaints_.tell(d, Vendor::fastdds, endpoints(), options_.log);
-    });
+    return inbound_.wait(
+        deadline, {},
+        [this](const Disagreement& d) { complaints_.tell(d, Vendor::fastdds, endpoints(), options_.log); },
+        [this] { complaints_.look(Vendor::fastdds, endpoints(), options_.log); });
   }
   void wake() noexcept override { inbound_.notifier.notify(); }
   const NodeOptions& options() const override { return options_; }
@@ -288,6 +310,8 @@ class FastNode final : public Node {
       type.register_type(participant_);
       made =
           participant_->create_topic(std::string(topic.name), type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+      complaints_.watch(topic);
+      inbound_.ends_changed();
     }
     return checked(made, "topic", topic);
   }
@@ -296,7 +320,7 @@ class FastNode final : public Node {
   const ParticipantNumber number_;
   Inbound inbound_;
   Complaints complaints_;
-  Neighbours neighbours_;
+  Neighbours neighbours_{inbound_};
   std::vector<std::unique_ptr<WriterEvents>> writer_events_;  // until the participant is gone
   std::vector<std::unique_ptr<ReaderEvents>> reader_events_;
   std::map<std::string_view, dds::Topic*> topics_;
@@ -304,78 +328,6 @@ class FastNode final : public Node {
   dds::Publisher* publisher_ = nullptr;
   dds::Subscriber* subscriber_ = nullptr;
 };
-
-rtps::Locator_t locator(const std::string& address, int port) {
-  rtps::Locator_t l;
-  l.kind = LOCATOR_KIND_UDPv4;
-  rtps::IPLocator::setIPv4(l, address);
-  l.port = static_cast<std::uint32_t>(port);
-  return l;
-}
-
-/// A prefix nobody had before, not even a process with our number on a host with our address (containers):
-/// peers take a restarted process for a new one at once.  Bytes 0 and 1 name the vendor.
-rtps::GuidPrefix_t random_prefix() {
-  rtps::GuidPrefix_t prefix;
-  std::random_device device;
-  prefix.value[0] = 0x01, prefix.value[1] = 0x0f;
-  for (unsigned i = 2; i < rtps::GuidPrefix_t::size; ++i)
-    prefix.value[i] = static_cast<rtps::octet>(device());
-  return prefix;
-}
-
-/// DDS Security by the files of an identity.
-void secure(dds::DomainParticipantQos& qos, const Identity& identity) {
-  auto& properties = qos.properties().properties();
-  const auto set = [&](const std::string& name, const std::string& value) {
-    properties.emplace_back("dds.sec." + name, value);
-  };
-  const auto file = [&](const std::string& name, const std::string& path) { set(name, "file://" + path); };
-  set("auth.plugin", "builtin.PKI-DH");
-  file("auth.builtin.PKI-DH.identity_ca", identity.ca);
-  file("auth.builtin.PKI-DH.identity_certificate", identity.certificate);
-  file("auth.builtin.PKI-DH.private_key", identity.key);
-  set("access.plugin", "builtin.Access-Permissions");
-  file("access.builtin.Access-Permissions.permissions_ca", identity.permissions_ca);
-  file("access.builtin.Access-Permissions.governance", identity.governance);
-  file("access.builtin.Access-Permissions.permissions", identity.permissions);
-  set("crypto.plugin", "builtin.AES-GCM-GMAC");
-}
-
-/// A client of a discovery server of Fast DDS (its first, as `fast-discovery-server -i 0` is).
-void use_server(dds::DomainParticipantQos& qos, const Server& server) {
-  auto& discovery = qos.wire_protocol().builtin.discovery_config;
-  discovery.discoveryProtocol = eprosima::fastrtps::rtps::DiscoveryProtocol_t::CLIENT;
-  rtps::RemoteServerAttributes remote;
-  remote.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");
-  remote.metatrafficUnicastLocatorList.push_back(locator(server.address, server.port));
-  discovery.m_DiscoveryServers.push_back(remote);
-}
-
-dds::DomainParticipantQos participant_qos(const NodeOptions& options, const Interface& interface, int index) {
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList = {interface.address};
-  udp->maxInitialPeersRange = kMaxParticipantIndex + 1;
-  udp->receiveBufferSize = 4 << 20;  // the kernel cuts it to its own limit
-  dds::DomainParticipantQos qos;
-  qos.name(options.name);
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  auto& wire = qos.wire_protocol();
-  wire.prefix = random_prefix();
-  wire.builtin.discovery_config.leaseDuration = duration(kLease);
-  wire.builtin.discovery_config.leaseDuration_announcementperiod = duration(kAnnouncement);
-  // Ports by hand: Fast DDS's participant numbers are unique in a process, not in a domain.
-  wire.builtin.metatrafficUnicastLocatorList.push_back(
-      locator(interface.address, metatraffic_port(options.domain, index)));
-  wire.default_unicast_locator_list.push_back(locator(interface.address, user_port(options.domain, index)));
-  const auto peers = unicast_peers(options, interface);
-  for (const std::string& peer : peers) wire.builtin.initialPeersList.push_back(locator(peer, 0));
-  if (peers.empty())
-    wire.builtin.metatrafficMulticastLocatorList.push_back(
-        locator("239.255.0.1", multicast_port(options.domain)));
-  return qos;
-}
 
 }  // namespace
 

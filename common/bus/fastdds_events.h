@@ -69,6 +69,7 @@ struct ReaderEvents final : Events, dds::DataReaderListener {
 /// The ends of other participants, as the vendor's threads find them.
 class Neighbours final : public dds::DomainParticipantListener {
  public:
+  explicit Neighbours(Inbound& inbound) : inbound_(inbound) {}
   void on_participant_discovery(dds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& found) override {
     const bool gone = found.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
                       found.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
@@ -116,9 +117,11 @@ class Neighbours final : public dds::DomainParticipantListener {
     e.liveliness = finite(data.m_qos.m_liveliness.lease_duration);
     e.id = id_of(data.guid());
     if (ends_.size() < kMaxNeighbours) ends_[data.guid()] = e;
+    inbound_.ends_changed();
   }
 
   static constexpr std::size_t kMaxNeighbours = 4096;
+  Inbound& inbound_;
   mutable std::mutex mutex_;
   std::map<rtps::GUID_t, Endpoint> ends_;
   std::map<rtps::GuidPrefix_t, std::string> names_;

@@ -186,13 +186,31 @@ Endpoint our_end(const Disagreement& d) {
   return e;
 }
 
+std::string whose(const Endpoint& e) {
+  return (e.writes ? "the writer of " : "the reader of ") +
+         (e.participant.empty() ? "an unnamed participant" : e.participant);
+}
+
 }  // namespace
+
+void Complaints::look(Vendor vendor, const std::vector<Endpoint>& known,
+                      const std::function<void(const std::string&)>& log) {
+  constexpr int kType = 0;  // no policy's number
+  for (const Endpoint& e : known) {
+    const auto ours = types_.find(e.topic);
+    if (ours == types_.end() || e.type == ours->second || !untold(ours->first, !e.writes, kType, e.id))
+      continue;
+    last_ = "topic " + e.topic + " (" + to_string(vendor) + "): " + whose(e) + " is of type " + e.type +
+            ", ours is " + std::string(ours->second) + "; no data flows between the two";
+    if (log) log(last_);
+  }
+}
 
 void Complaints::tell(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known,
                       const std::function<void(const std::string&)>& log) {
   const Endpoint ours = our_end(d);
   const auto say = [&](const WriterId& peer, const std::string& theirs) {
-    if (told_.size() >= kMost || !told_.emplace(d.topic->name, d.we_write, d.policy, peer).second) return;
+    if (!untold(d.topic->name, d.we_write, d.policy, peer)) return;
     last_ = "topic " + std::string(d.topic->name) + " (" + to_string(vendor) + "): QoS " +
             policy_name(d.policy) +
             " does not match: " + (d.we_write ? "our writer offers " : "our reader asks for ") +
@@ -204,9 +222,7 @@ void Complaints::tell(const Disagreement& d, Vendor vendor, const std::vector<En
     if (e.topic != d.topic->name || e.writes == d.we_write) continue;
     if (!differ(d.policy, d.we_write ? ours : e, d.we_write ? e : ours)) continue;
     named = true;
-    say(e.id, std::string(d.we_write ? "the reader of " : "the writer of ") +
-                  (e.participant.empty() ? "an unnamed participant" : e.participant) +
-                  (d.we_write ? " asks for " : " offers ") + value(d.policy, e));
+    say(e.id, whose(e) + (d.we_write ? " asks for " : " offers ") + value(d.policy, e));
   }
   if (!named) say({}, d.we_write ? "a peer's reader asks for more" : "a peer's writer offers less");
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// What both vendors need to know about this host's network before they start.  Private to common/bus.
 
+#include <map>
 #include <set>
 #include <string>
 #include <tuple>
@@ -62,18 +63,27 @@ struct Disagreement {
   bool operator==(const Disagreement&) const = default;
 };
 
-/// Who cannot agree with us, told to a user once for each peer, topic and policy.
+/// Who cannot agree with us, told to a user once for each peer, topic and policy (or type).
 class Complaints {
  public:
   /// One sentence for each peer among `known` that was not named before: which topic and policy, what it is
   /// on both sides, and whose.  Where nobody is known to differ: that a peer does.
   void tell(const Disagreement& d, Vendor vendor, const std::vector<Endpoint>& known,
             const std::function<void(const std::string&)>& log);
+  /// A topic of ours.
+  void watch(const Topic& topic) { types_[topic.name] = topic.type; }
+  /// One sentence for each end among `known` that carries another type on a topic of ours.
+  void look(Vendor vendor, const std::vector<Endpoint>& known,
+            const std::function<void(const std::string&)>& log);
   const std::string& last() const { return last_; }
 
  private:
   static constexpr std::size_t kMost = 256;
+  bool untold(std::string_view topic, bool we_write, int policy, const WriterId& peer) {
+    return told_.size() < kMost && told_.emplace(topic, we_write, policy, peer).second;
+  }
   std::set<std::tuple<std::string_view, bool, int, WriterId>> told_;
+  std::map<std::string_view, std::string_view> types_;
   std::string last_;
 };
 

@@ -64,6 +64,18 @@ std::uint32_t key_in(const Payload& p) {
   }
 }
 
+/// Another stranger's: more keys than Fast DDS is let keep, each said once; then it stays.
+constexpr std::uint32_t kHorde = 90'000;
+[[noreturn]] void swarm(Vendor vendor, std::uint32_t domain) {
+  const auto node = open(vendor, domain);
+  const auto command = node->writer(topics::kCommand);
+  while (command->matched() == 0) node->wait(Clock::now() + 5ms);
+  for (std::uint32_t i = 0;; ++i) {
+    if (i < kHorde) command->write(sample(i, 32, kStrangers + i));
+    if (i % 100 == 0) node->wait(Clock::now() + 1ms);  // as fast as most can read
+  }
+}
+
 auto program(const char* role, Vendor vendor, std::uint32_t domain) {
   return [=] { execl("/proc/self/exe", role, to_string(vendor), std::to_string(domain).c_str(), nullptr); };
 }
@@ -154,6 +166,23 @@ TEST_P(Process, AStrangerWithManyKeysSilencesNobody) {
   EXPECT_TRUE(answered(*node, *writer, *reader, 300)) << "an arm that comes when the stranger has gone";
 }
 
+/// However many keys a stranger has, nobody ends or fills up, and those that are known are heard again.
+TEST_P(Process, AStrangerWithAHordeOfKeysEndsNobody) {
+  const auto [here, there, domain] = GetParam();
+  const auto node = open(here, domain + 11);
+  const auto writer = node->writer(topics::kState);
+  const auto reader = node->reader(topics::kCommand);
+  const Child other(program("peer", there, domain + 11));
+  ASSERT_TRUE(answered(*node, *writer, *reader));
+  const Child stranger(program("swarm", there, domain + 11));
+  const auto deadline = Clock::now() + 60s;
+  while (reader->counters().lost < kHorde * 9 / 10) {
+    ASSERT_LT(Clock::now(), deadline) << "lost " << reader->counters().lost;
+    ASSERT_TRUE(answered(*node, *writer, *reader));
+  }
+  EXPECT_TRUE(answered(*node, *writer, *reader));
+}
+
 INSTANTIATE_TEST_SUITE_P(Vendors, Process,
                          testing::Values(Pair{Vendor::fastdds, Vendor::fastdds, 200},
                                          Pair{Vendor::cyclonedds, Vendor::cyclonedds, 202},
@@ -169,8 +198,8 @@ INSTANTIATE_TEST_SUITE_P(Vendors, Process,
 
 int main(int argc, char** argv) {
   const std::string_view role = argv[0];
-  if (argc == 3 && (role == "peer" || role == "crowd")) {
-    const auto live = role == "peer" ? hamel::answer : hamel::crowd;
+  if (argc == 3 && (role == "peer" || role == "crowd" || role == "swarm")) {
+    const auto live = role == "peer" ? hamel::answer : role == "crowd" ? hamel::crowd : hamel::swarm;
     live(hamel::bus::vendor_from(argv[1]).value(), static_cast<std::uint32_t>(std::atoi(argv[2])));
   }
   testing::InitGoogleTest(&argc, argv);

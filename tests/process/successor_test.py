@@ -21,14 +21,12 @@ class Successor(unittest.TestCase):
 
     def drives(self, domain, before):
         """The arm's step once it obeys a planner that sees, later than `before`."""
-        end = time.monotonic() + 30
+        end, state, report = time.monotonic() + 30, None, None
         while time.monotonic() < end:
-            said = []
-            for topic in ("state", "report"):
-                code, out, err = hamel("topic", "echo", topic, "--count", 1, "--json", "--domain", domain)
-                self.assertEqual(code, 0, err)
-                said.append(json.loads(out))
-            state, report = said
+            echoes = [hamel("topic", "echo", topic, "--count", 1, "--json", "--domain", domain) for topic in ("state", "report")]
+            if any(code for code, _, _ in echoes):
+                continue  # not up yet, on a busy machine
+            state, report = (json.loads(out) for _, out, _ in echoes)
             sees = isinstance(report["obstacle_age_s"], (int, float)) and report["obstacle_age_s"] < 0.3
             if state["validity"] == 0 and sees and min(state["step"], report["step"]) > before + 500:
                 return state["step"]

@@ -32,6 +32,40 @@ class Doctor(unittest.TestCase):
         self.assertIn("nosuch0", out)
 
 
+class Multicast(unittest.TestCase):
+    """What doctor finds out by a datagram of its own, in a network name space with one cable and no route but to its neighbours."""
+
+    def on_the_cable(self, *changes):
+        """The two findings about the cable's end: verdict and text, None where there is no such finding."""
+        steps = ["ip link set lo up", "ip link add here type veth peer name there", "ip addr add 10.99.1.1/24 dev here",
+                 "ip link set here up", "ip link set there up"]
+        inside = ["unshare", "-rn", "bash", "-ec"]
+        if subprocess.run([*inside, "; ".join(steps)], capture_output=True).returncode:
+            self.skipTest("no privilege for a network name space with a cable (veth)")
+        done = subprocess.run([*inside, "; ".join([*steps, *changes, f"'{BIN}/hamel' doctor --json --domain 83"])], capture_output=True,
+                              text=True, timeout=60)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        findings = {f["what"]: f for f in json.loads(done.stdout)["findings"]}
+        return [(f["verdict"], f["text"]) if (f := findings.get(what)) else None for what in ("interface here", "multicast on here")]
+
+    def test_comes_back_where_the_interface_has_it(self):
+        self.assertEqual(self.on_the_cable(), [("ok", "multicast discovery"), ("ok", "tried: a datagram came back")])
+
+    def test_needs_no_route(self):
+        self.assertEqual(self.on_the_cable("ip route add unreachable 239.255.0.0/16")[1], ("ok", "tried: a datagram came back"))
+
+    def test_is_not_tried_where_the_interface_has_none(self):
+        self.assertEqual(self.on_the_cable("ip link set here multicast off"), [("ok", "no multicast: give every host as --peer"), None])
+
+    def test_that_does_not_come_back_is_noted(self):
+        self.assertEqual(self.on_the_cable("echo 0 > /proc/sys/net/ipv4/igmp_max_memberships")[1],
+                         ("note", "tried: nothing came back within a second"))
+
+    def test_is_not_tried_without_a_cable(self):
+        self.assertEqual(self.on_the_cable("ip link set there down"),
+                         [("note", "is up, but nothing is at the other end of its cable"), None])
+
+
 class Topic(unittest.TestCase):
     def test_nobody_there_is_exit_code_three(self):
         for verb in (["list"], ["echo", "state", "--seconds", 1], ["hz", "--seconds", 1], ["latency", "--seconds", 1]):
@@ -117,6 +151,44 @@ class Arms(unittest.TestCase):
                               capture_output=True, text=True, timeout=60)
         self.assertEqual(done.returncode, 2)
         self.assertIn("arm 1", done.stderr)
+
+
+class Strangers(unittest.TestCase):
+    """A peer that a service cannot work with stands in one line of the service's log and in `hamel status`."""
+
+    def named(self, vendor, domain, kind, *words):
+        stranger = subprocess.Popen([os.environ["HAMEL_STRANGER"], vendor, str(domain), kind], stdin=subprocess.PIPE)
+        planner = subprocess.Popen([BIN / "hamel-planner", scene("four_link_avoid"), "--bus", vendor, "--domain", str(domain)],
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            end, out = time.monotonic() + 30, ""
+            while time.monotonic() < end and not all(w in out for w in words):
+                _, out, _ = hamel("status", "--bus", vendor, "--domain", domain, "--seconds", 1)
+            for word in words:
+                self.assertIn(word, out)
+        finally:
+            stranger.communicate()
+            planner.terminate()
+            log = planner.communicate(timeout=20)[1].splitlines()
+        self.assertEqual(sum(all(w in line for w in words) for line in log), 1, log)
+        return out
+
+    def test_of_another_type(self):
+        for i, vendor in enumerate(("fastdds", "cyclonedds")):
+            with self.subTest(vendor):
+                self.named(vendor, 60 + i, "type", "hamel/v1/goal", "the writer of stranger", "elsewhere::Goal", "hamel::v1::Goal")
+
+    def test_of_another_qos(self):
+        for i, vendor in enumerate(("fastdds", "cyclonedds")):
+            with self.subTest(vendor):
+                self.named(vendor, 62 + i, "qos", "hamel/v1/status", "durability", "the writer of stranger", "volatile", "transient-local")
+
+    def test_of_another_idl(self):
+        for i, vendor in enumerate(("fastdds", "cyclonedds")):
+            with self.subTest(vendor):
+                out = self.named(vendor, 64 + i, "idl", "planner of arm 9 is 9.9 with IDL of-elsewhere")
+                self.assertIn("other IDL: of-elsewhere", out)
+                self.assertIn("degraded", out.lower())
 
 
 class RealTime(unittest.TestCase):
