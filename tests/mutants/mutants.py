@@ -68,7 +68,7 @@ MUTANTS = [
            "std::abs(d - h * qd[i]) > 10 * bound)", "guards_test", "*SpuriousRoot*by_its_turn"),
     Mutant("any_energy", "a root that makes up energy is no step", CORE + "marcher.cpp", "kEnergyBound = 0.1;", "kEnergyBound = 0.24;",
            "guards_test", "*SpuriousRoot*by_its_energy"),
-    Mutant("timid_guard", "steps up to 1/omega are taken whole", CORE + "increment_root.h", "kTurnBound = 1.0;", "kTurnBound = 0.1;",
+    Mutant("timid_guard", "steps up to 1/omega are taken whole", CORE + "increment_root.h", "kTurnBound = 1.0;", "kTurnBound = 0.01;",
            "extremes_test", "*FollowTheWhip"),
     Mutant("residual_in_squares", "operations of a residual are linear in n", CORE + "midpoint.cpp",
            "largest = std::max(largest, size);", "for (int j = chain_.n(); j-- > i;) largest = std::max(largest, std::abs(r[j]));",
