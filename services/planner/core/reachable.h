@@ -23,4 +23,10 @@ struct Reachability {
 Reachability reachability(const model::Chain& chain, const scene::Goal& goal,
                           const scene::PlannerOptions& options, const Eigen::VectorXd* near = nullptr);
 
+/// A configuration that meets a position or pose goal, found by descent from `start`, each joint within half
+/// a turn of it where its limits allow; empty where the descent ends elsewhere.  Obstacles play no part.
+/// Allocates.
+Eigen::VectorXd configuration_at(const model::Chain& chain, const scene::Goal& goal,
+                                 const scene::PlannerOptions& options, const Eigen::VectorXd& start);
+
 }  // namespace hamel::planner
