@@ -85,7 +85,7 @@ struct PlannerOptions {
   double assumed_acceleration_mps2 = 1;  ///< a of the inflation a/2 age^2 of every obstacle, >= 0
   int escapes = 8;                       ///< gyro: ways out looked for by rollouts at one goal, 0: none
   int escape_rollouts = 16;              ///< waypoints tried for one way out, >= 1
-  double escape_horizon_s = 8;           ///< how far ahead a rollout looks, > 0
+  double escape_horizon_s = 12;          ///< how far ahead a rollout looks, > 0
   double escape_delay_s = 0.2;           ///< the answer enters so long after the question, >= 0
   /// A target that no configuration meets, or that an obstacle stands over: STUCK at once and no motion, or
   /// as near as can be and then STUCK.
