@@ -79,7 +79,7 @@ struct PlannerOptions {
   double stale_brake_s = 0.3;          ///< obstacles older than this: stop and UNSAFE, > 0
   double stale_slow_s = 0.1;           ///< obstacles older than this: slow down, > 0
   double stale_state_s = 0.05;         ///< arm state older than this: brake and UNSAFE, > 0
-  double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
+  double brake_rate = 60;              ///< bmax: braking is qdd = -(bmax + 15/speed) qd [1/s], > 0
   double assumed_speed_mps =
       1;  ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
   double assumed_acceleration_mps2 = 1;  ///< a of the inflation a/2 age^2 of every obstacle, >= 0
