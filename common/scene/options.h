@@ -79,13 +79,13 @@ struct PlannerOptions {
   double stale_brake_s = 0.3;          ///< obstacles older than this: stop and UNSAFE, > 0
   double stale_slow_s = 0.1;           ///< obstacles older than this: slow down, > 0
   double stale_state_s = 0.05;         ///< arm state older than this: brake and UNSAFE, > 0
-  double brake_rate = 60;              ///< bmax: braking is qdd = -bmax qd [1/s], > 0
+  double brake_rate = 60;              ///< bmax: braking is qdd = -(bmax + 15/speed) qd [1/s], > 0
   double assumed_speed_mps =
       1;  ///< inflation per second of age where an obstacle's velocity is unknown, >= 0
   double assumed_acceleration_mps2 = 1;  ///< a of the inflation a/2 age^2 of every obstacle, >= 0
   int escapes = 8;                       ///< gyro: ways out looked for by rollouts at one goal, 0: none
   int escape_rollouts = 16;              ///< waypoints tried for one way out, >= 1
-  double escape_horizon_s = 8;           ///< how far ahead a rollout looks, > 0
+  double escape_horizon_s = 12;          ///< how far ahead a rollout looks, > 0
   double escape_delay_s = 0.2;           ///< the answer enters so long after the question, >= 0
   /// A target that no configuration meets, or that an obstacle stands over: STUCK at once and no motion, or
   /// as near as can be and then STUCK.

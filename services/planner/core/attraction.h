@@ -29,6 +29,8 @@ class Attraction {
   void update(const Arm& arm, const scene::Goal& goal, double age_s, double slow) noexcept;
 
   const Eigen::VectorXd& torque() const noexcept { return torque_; }
+  /// M^-1 of what torque() would be at rest [rad/s^2 or m/s^2]: it asks for v_d and brakes nothing.
+  const Eigen::VectorXd& drive() const noexcept { return drive_; }
   const GoalError& error() const noexcept { return error_; }
   /// kp/2 e^T Lam e, with the inertia along the wanted acceleration for Lam: energy of the pull [J].
   double potential_J() const noexcept { return potential_; }
@@ -61,7 +63,7 @@ class Attraction {
       Eigen::Matrix<double, 6, 1>::Zero();  ///< angular part unused for positions
   Eigen::Matrix<double, 6, 6> Lam_inverse_ = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::LLT<Eigen::Matrix<double, 6, 6>> Lam_;
-  Eigen::VectorXd torque_, qdd_;
+  Eigen::VectorXd torque_, qdd_, drive_;
   Eigen::MatrixXd WJ_;  ///< n x 6: W^-1 J^T
   Eigen::MatrixXd W_;
   Eigen::LLT<Eigen::MatrixXd> W_llt_;

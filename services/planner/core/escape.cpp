@@ -6,6 +6,7 @@
 
 #include "common/base/random.h"
 #include "common/rbd/rbd.h"
+#include "services/planner/core/reachable.h"
 
 namespace hamel::planner {
 namespace {
@@ -27,6 +28,14 @@ VectorXd draw_waypoint(const model::Chain& chain, const VectorXd& q, double spre
     w[j] = dice.uniform(std::min(low, high), std::max(low, high));
   }
   return w;
+}
+
+// From there on to the goal: another posture to meet it with, if the way there is found.
+void go_to_goal(const model::Chain& chain, const scene::Goal& goal, const Options& options,
+                VectorXd& waypoint) {
+  if (goal.kind == scene::GoalKind::joints) return;
+  const VectorXd q = configuration_at(chain, goal, options, waypoint);
+  if (q.size() > 0) waypoint = q;
 }
 
 /// The planner and a model of the arm, stepped together.
@@ -115,7 +124,8 @@ Escape find_escape(const scene::Robot& robot, const Options& options, const Esca
   if (!question.stuck && rollout.run(from, {}, most_s).reached) return escape;
   for (int k = 0; k < options.escape_rollouts; ++k) {
     const double spread = k % 4 == 0 ? 0.15 : k % 4 == 1 ? 0.3 : k % 4 == 2 ? 0.6 : 1.0;
-    const VectorXd waypoint = draw_waypoint(robot.chain, question.q, spread, dice);
+    VectorXd waypoint = draw_waypoint(robot.chain, question.q, spread, dice);
+    if (k % 2 == 1) go_to_goal(robot.chain, from.goal, options, waypoint);
     const Rollout::Ending ending = rollout.run(from, waypoint, most_s);
     ++escape.rollouts;
     if (stop && stop()) return {};

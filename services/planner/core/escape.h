@@ -34,7 +34,8 @@ struct Escape {
   double reached_after_s = 0;  ///< of the run chosen
 };
 
-/// Rolls out `options.escape_rollouts` random waypoints, `escape_horizon_s` each, at 10 ms a cycle; of the
+/// Rolls out `options.escape_rollouts` random waypoints, every other one a posture at the goal itself,
+/// `escape_horizon_s` each, at 10 ms a cycle; of the
 /// runs that reach the goal without contact the quickest wins.  None does: not found.  An arm that is not
 /// stuck and reaches its goal as it goes needs none: not found either.
 /// @param stop  asked in each cycle of a rollout; once it says true the answer is: not found

@@ -133,7 +133,7 @@ void Gyro::add_powerless(const Arm& arm, Pairs& pairs, double dt_s, VectorXd& ta
 }
 
 bool Gyro::add_circulation(Pairs& pairs, Memory& memory, double t_s, double kc, const VectorXd& qdd_att,
-                           VectorXd& tau) noexcept {
+                           const VectorXd& qdd_rest, VectorXd& tau) noexcept {
   const auto items = pairs.items();
   // First contact with an obstacle: its nearest pair chooses for all links.
   for (const Pair& pair : items) {
@@ -151,7 +151,8 @@ bool Gyro::add_circulation(Pairs& pairs, Memory& memory, double t_s, double kc, 
   for (std::size_t k = 0; k < items.size(); ++k) {
     Pair& pair = items[k];
     const HeldTurn* turn = held_turn(memory, pair.obstacle, t_s);
-    const double press = pair.n.dot(pairs.J(k).lazyProduct(qdd_att));
+    const double press =
+        std::min(pair.n.dot(pairs.J(k).lazyProduct(qdd_att)), pair.n.dot(pairs.J(k).lazyProduct(qdd_rest)));
     if (!turn || !(press > 0)) continue;
     pressed = true;
     const double strength = kc * smooth_step(1 - pair.d / options_.rho0_m) * press;

@@ -31,6 +31,7 @@ struct Planner::Impl {
         pairs(robot, options, savings),
         tau_att(Eigen::VectorXd::Zero(arm.n())),
         qdd_att(tau_att),
+        qdd_rest(tau_att),
         qdd(tau_att),
         q_now(tau_att),
         scratch(kMaxPairs) {
@@ -72,7 +73,7 @@ struct Planner::Impl {
   Obstacles obstacles;
   Pairs pairs;
   Barrier::Outcome outcome;
-  Eigen::VectorXd tau_att, qdd_att, qdd;
+  Eigen::VectorXd tau_att, qdd_att, qdd_rest, qdd;
   Eigen::VectorXd q_now;  // the state carried on to now
   double lag_s = 0;       // by so much
   std::vector<HeldPair> scratch;

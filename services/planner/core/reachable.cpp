@@ -45,6 +45,16 @@ class Search {
     return low_ + Eigen::Map<const VectorXd>(u.data(), chain_.n()).cwiseProduct(high_ - low_);
   }
 
+  // The same posture inside the limits searched.
+  VectorXd within_a_turn(const VectorXd& q) const {
+    VectorXd out = q;
+    for (int i = 0; i < chain_.n(); ++i) {
+      constexpr double kTurn = 2 * std::numbers::pi;
+      if (high_[i] - low_[i] >= kTurn) out[i] -= kTurn * std::floor((q[i] - low_[i]) / kTurn);
+    }
+    return out;
+  }
+
   // What is left of the way at q: turned, moved; sets J_.
   Vector6d error(const VectorXd& q) {
     rbd::positions(chain_, q, ws_);
@@ -110,6 +120,11 @@ class Search {
   lie::Pose X_WE_;
 };
 
+bool meets(const Vector6d& left, const scene::PlannerOptions& o) {
+  return left.tail<3>().norm() <= 0.5 * o.goal_tolerance_m &&
+         left.head<3>().norm() <= 0.5 * kTurn_m * o.goal_tolerance_rad;
+}
+
 }  // namespace
 
 std::uint64_t goals_searched() noexcept { return searched; }
@@ -126,15 +141,22 @@ Reachability reachability(const model::Chain& chain, const ReachQuestion& questi
   for (int k = begin ? -1 : 0; k < (begin ? kFewStarts : kStarts) && !(stop && stop()); ++k) {
     VectorXd q = k < 0 ? question.near : search.start(k);
     const Vector6d e = search.descend(q, stop);
-    if (e.tail<3>().norm() <= 0.5 * o.goal_tolerance_m &&
-        e.head<3>().norm() <= 0.5 * kTurn_m * o.goal_tolerance_rad)
-      return {true, goal.X_WG.p};
+    if (meets(e, o)) return {true, goal.X_WG.p};
     if (e.norm() < least) {
       least = e.norm();
       out.nearest_W = goal.X_WG.p - e.tail<3>();
     }
   }
   return out;
+}
+
+VectorXd configuration_at(const model::Chain& chain, const scene::Goal& goal, const scene::PlannerOptions& o,
+                          const VectorXd& start) {
+  Search search(chain, goal);
+  VectorXd q = search.within_a_turn(start);
+  const VectorXd turned = start - q;
+  if (!meets(search.descend(q), o)) return {};
+  return q + turned;
 }
 
 }  // namespace hamel::planner

@@ -37,4 +37,10 @@ Reachability reachability(const model::Chain& chain, const ReachQuestion& questi
 /// How many goals this thread has searched for so far: a control thread's number stands still.
 std::uint64_t goals_searched() noexcept;
 
+/// A configuration that meets a position or pose goal, found by descent from `start`, each joint within half
+/// a turn of it where its limits allow; empty where the descent ends elsewhere.  Obstacles play no part.
+/// Allocates.
+Eigen::VectorXd configuration_at(const model::Chain& chain, const scene::Goal& goal,
+                                 const scene::PlannerOptions& options, const Eigen::VectorXd& start);
+
 }  // namespace hamel::planner

@@ -14,7 +14,8 @@ using scene::Method;
 
 namespace {
 
-constexpr double kFade_s = 0.5;  // circulation comes back over it after the barrier was infeasible
+constexpr double kLastBrake = 15;  // what braking ends with [rad/s^2 or m/s^2]
+constexpr double kFade_s = 0.5;    // circulation comes back over it after the barrier was infeasible
 
 }  // namespace
 
@@ -49,6 +50,7 @@ void Planner::Impl::steer(const Input& in, bool refused, VectorXd& tau) noexcept
     tau_att *= options.amax / most;
     qdd_att *= options.amax / most;
   }
+  qdd_rest = pull_share * attraction.drive();
   tau = tau_att - options.damping * arm.momentum;
   if (options.method == Method::khatib) {
     for (std::size_t k = 0; k < pairs.items().size(); ++k) {
@@ -82,7 +84,7 @@ void Planner::Impl::circulate(const Input& in, VectorXd& tau) noexcept {
   if (!(options.kc > 0) || !has_goal) return;
   const double fade = std::clamp((t_s - memory.infeasible_s) / kFade_s, 0.0, 1.0);
   const double kc = near_enough() ? 0 : fade * open_tank(in.dt_s) * options.kc;
-  const bool pressed = gyro.add_circulation(pairs, memory, t_s, kc, qdd_att, tau);
+  const bool pressed = gyro.add_circulation(pairs, memory, t_s, kc, qdd_att, qdd_rest, tau);
   memory.tank_J -= std::max(gyro.circulation_power_W(), 0.0) * in.dt_s;
   const double error = attraction.error().scaled;
   if (pressed) memory.pressed_s = t_s;
@@ -114,10 +116,14 @@ bool Planner::Impl::guard(const Input& in, VectorXd& tau) noexcept {
   return outcome.infeasible;
 }
 
-// qdd = -bmax qd, exact over the period: qd falls to exp(-bmax dt) of itself, whatever dt.
+// qdd = -(bmax + a/s) qd with s the speed of the fastest joint: s falls as sdot = -bmax s - a and is 0 after
+// a while, where -bmax s alone would creep.  Exact over the period, whatever dt:
+//   s(dt) = max(0, (s + a/bmax) exp(-bmax dt) - a/bmax).
 double Planner::Impl::braking_rate(double dt_s) const noexcept {
   const double dt = std::isfinite(dt_s) ? std::max(dt_s, kLeastPeriod_s) : 1e-3;
-  return std::expm1(-options.brake_rate * dt) / dt;
+  const double s = std::max(arm.qd.lpNorm<Eigen::Infinity>(), 1e-9);
+  const double lost = std::expm1(-options.brake_rate * dt) * (1 + kLastBrake / (options.brake_rate * s));
+  return std::max(lost, -1.0) / dt;
 }
 
 // As hard as the joints are strong.  What stands about the arm plays no part: it may be old, or wrong.
