@@ -79,7 +79,7 @@ int goal(const GoalArgs& args) {
   if (!asked) return runtime::complain("hamel goal", {asked.error()});
   wire::Goal g = std::move(asked).value();
   if (!args.joints.empty()) {
-    wire::Subscription<wire::ArmState> states(n);
+    wire::Subscription<wire::ArmState> states(n, bus::Ask::glimpse);
     wire::ArmState s;
     if (!wait_for(n, states, s, [&](const auto& m) { return m.arm == args.arm; }))
       return nobody("goal", "arm", args.bus);
@@ -89,7 +89,7 @@ int goal(const GoalArgs& args) {
                                                   s.position.size())}});
   }
   wire::Publisher<wire::Goal> out(n);
-  wire::Subscription<wire::PlannerReport> reports(n);
+  wire::Subscription<wire::PlannerReport> reports(n, bus::Ask::glimpse);
   wire::PlannerReport r;
   if (!wait_for(n, reports, r, [&](const auto& m) { return m.arm == args.arm; }))
     return nobody("goal", "planner", args.bus);
@@ -119,8 +119,8 @@ int mode(const ModeArgs& args) {
   if (!node) return runtime::complain("hamel " + args.mode, {node.error()});
   bus::Node& n = *node.value();
   wire::Publisher<wire::ModeCommand> out(n);
-  wire::Subscription<wire::ArmState> states(n);
-  wire::Subscription<wire::PlannerReport> reports(n);
+  wire::Subscription<wire::ArmState> states(n, bus::Ask::glimpse);
+  wire::Subscription<wire::PlannerReport> reports(n, bus::Ask::glimpse);
   wire::ArmState s;
   if (!wait_for(n, states, s, [&](const auto& m) { return m.arm == args.arm; }))
     return nobody(args.mode.c_str(), "arm", args.bus);

@@ -144,7 +144,7 @@ int topic_echo(const TopicArgs& args) {
   if (!node) return runtime::complain("hamel topic echo", {node.error()});
   bus::Node& n = *node.value();
   stop.on_stop([&n] { n.wake(); });
-  const auto reader = n.reader(*topic);
+  const auto reader = n.reader(*topic, 0, bus::Ask::glimpse);
   const auto deadline = Clock::now() + runtime::seconds(args.seconds);
   bus::Payload p;
   std::uint64_t shown = 0;

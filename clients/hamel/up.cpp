@@ -19,7 +19,7 @@ constexpr auto kLastWords = 2s;  // of dynamics, after it has ended
 
 /// The clock of an arm of this key that runs already; waits a moment, for a match takes one.
 std::optional<wire::SimulationClock> other_arm(bus::Node& node, std::uint32_t arm) {
-  wire::Subscription<wire::SimulationClock> clocks(node);
+  wire::Subscription<wire::SimulationClock> clocks(node, bus::Ask::glimpse);
   const auto deadline = runtime::Clock::now() + kLook;
   wire::SimulationClock c;
   do {

@@ -51,6 +51,9 @@ using WriterId = std::array<std::uint8_t, 16>;
 enum class Ask : std::uint8_t {
   data,      ///< the data: matches every reliable writer, a foreign one with default QoS too
   promises,  ///< also to keep the topic's rate and to say that they live; what is missed is counted
+  /// Of a stream, what comes by: nothing is repeated for it (best effort).  For those that stay a moment:
+  /// Fast DDS's writers may stand still for ever when one leaves for whom they are repeating something.
+  glimpse,
 };
 
 /// One end of a topic anywhere on the domain.

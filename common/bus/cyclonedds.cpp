@@ -130,12 +130,14 @@ Listener listener_for(Events& events) {
   return l;
 }
 
-/// `promises`: those of a topic's writers, offered by each, asked for by some readers.
-Qos qos_for(const Topic& topic, bool writes, int depth, bool promises) {
+/// The promises of a topic's writers are offered by each, asked for by some readers.
+Qos qos_for(const Topic& topic, bool writes, int depth, Ask ask) {
+  const bool promises = writes || ask == Ask::promises;
   const bool latched = topic.delivery == Delivery::latched;
   const auto more = writes ? std::chrono::milliseconds(0) : kRounding;
   Qos q(dds_create_qos());
-  dds_qset_reliability(q.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
+  dds_qset_reliability(q.get(), reliable(topic, ask) ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       DDS_MSECS(100));
   dds_qset_durability(q.get(), latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, depth);
   if (promises && topic.rate_hz > 0) dds_qset_deadline(q.get(), DDS_MSECS((topic.stale + more).count()));
@@ -270,18 +272,18 @@ class CycloneNode final : public Node {
 
   std::unique_ptr<Writer> writer(const Topic& topic) override {
     Events& events = make_events(topic, true, Ask::data);
-    const dds_entity_t made = dds_create_writer(participant_, topic_for(topic).entity,
-                                                qos_for(topic, true, depth_of(topic.delivery), true).get(),
-                                                listener_for(events).get());
+    const dds_entity_t made = dds_create_writer(
+        participant_, topic_for(topic).entity,
+        qos_for(topic, true, depth_of(topic.delivery), Ask::data).get(), listener_for(events).get());
     return std::make_unique<CycloneWriter>(topic, checked(made, "writer", topic), events);
   }
 
   std::unique_ptr<Reader> reader(const Topic& topic, int depth, Ask ask) override {
     Events& events = make_events(topic, false, ask);
     if (depth <= 0) depth = depth_of(topic.delivery);
-    const dds_entity_t made = dds_create_reader(participant_, topic_for(topic).entity,
-                                                qos_for(topic, false, depth, ask == Ask::promises).get(),
-                                                listener_for(events).get());
+    const dds_entity_t made =
+        dds_create_reader(participant_, topic_for(topic).entity, qos_for(topic, false, depth, ask).get(),
+                          listener_for(events).get());
     return std::make_unique<CycloneReader>(topic, checked(made, "reader", topic), events,
                                            topic_for(topic).keys);
   }

@@ -72,6 +72,7 @@ dds::DataReaderQos reader_qos(const Topic& topic, int depth, Ask ask) {
   qos.resource_limits().max_instances = kVendorInstances;
   qos.resource_limits().max_samples = kVendorInstances * qos.history().depth;
   if (ask == Ask::promises) promise(qos, topic, kRounding);
+  if (!reliable(topic, ask)) qos.reliability().kind = dds::BEST_EFFORT_RELIABILITY_QOS;
   return qos;
 }
 

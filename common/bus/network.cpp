@@ -178,9 +178,11 @@ bool differ(int policy, const Endpoint& writer, const Endpoint& reader) {
 }
 
 Endpoint our_end(const Disagreement& d) {
-  Endpoint e{.writes = d.we_write, .reliable = true, .latched = d.topic->delivery == Delivery::latched};
+  Endpoint e{.writes = d.we_write,
+             .reliable = reliable(*d.topic, d.ask),
+             .latched = d.topic->delivery == Delivery::latched};
   const auto more = d.we_write ? std::chrono::milliseconds(0) : kRounding;
-  if (!d.we_write && d.ask == Ask::data) return e;
+  if (!d.we_write && d.ask != Ask::promises) return e;
   if (d.topic->rate_hz > 0) e.deadline = d.topic->stale + more;
   e.liveliness = kAlive + more;
   return e;

@@ -54,6 +54,11 @@ inline constexpr std::chrono::milliseconds kAlive{1000};
 /// way.
 inline constexpr std::chrono::milliseconds kRounding{1};
 
+/// Whether a reader has repeated what is lost on the way.
+constexpr bool reliable(const Topic& topic, Ask ask) {
+  return ask != Ask::glimpse || topic.delivery == Delivery::latched;
+}
+
 /// An end of ours and a peer cannot agree: kept by the vendor's thread, told by the owner's.
 struct Disagreement {
   const Topic* topic = nullptr;

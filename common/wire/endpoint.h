@@ -27,7 +27,8 @@ class Publisher {
 template <class T>
 class Subscription {
  public:
-  explicit Subscription(bus::Node& node) : node_(node), reader_(node.reader(topic_of<T>())) {}
+  explicit Subscription(bus::Node& node, bus::Ask ask = bus::Ask::data)
+      : node_(node), reader_(node.reader(topic_of<T>(), 0, ask)) {}
 
   /// The oldest waiting message that decodes; those that do not are counted and dropped.  False when none
   /// waits, and after kRound messages in a row, good or bad, once: a flood must not keep the caller from what

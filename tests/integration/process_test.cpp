@@ -76,6 +76,17 @@ constexpr std::uint32_t kHorde = 90'000;
   }
 }
 
+/// A client that looks at one sample and leaves.
+[[noreturn]] void glance(Vendor vendor, std::uint32_t domain) {
+  {
+    const auto node = open(vendor, domain);
+    const auto state = node->reader(topics::kState, 0, bus::Ask::glimpse);
+    Payload p;
+    while (!state->take(p)) node->wait(Clock::now() + 100ms);
+  }
+  _exit(0);
+}
+
 auto program(const char* role, Vendor vendor, std::uint32_t domain) {
   return [=] { execl("/proc/self/exe", role, to_string(vendor), std::to_string(domain).c_str(), nullptr); };
 }
@@ -166,6 +177,24 @@ TEST_P(Process, AStrangerWithManyKeysSilencesNobody) {
   EXPECT_TRUE(answered(*node, *writer, *reader, 300)) << "an arm that comes when the stranger has gone";
 }
 
+/// Flat out, as lockstep is: what a client that comes and goes leaves to be repeated, and to be forgotten.
+TEST_P(Process, ClientsThatComeAndGoStopNobody) {
+  const auto [here, there, domain] = GetParam();
+  const auto node = open(here, domain + 12);
+  const auto writer = node->writer(topics::kState);
+  const auto reader = node->reader(topics::kCommand);
+  const Child other(program("peer", there, domain + 12));
+  for (int i = 0; i < 40; ++i) {
+    const Child client(program("glance", there, domain + 12));
+    const auto deadline = Clock::now() + kDeadline;
+    do {
+      ASSERT_LT(Clock::now(), deadline) << "client " << i << " sees nothing";
+      ASSERT_TRUE(answered(*node, *writer, *reader)) << "client " << i;
+    } while (waitpid(client.pid(), nullptr, WNOHANG) == 0);
+  }
+  EXPECT_TRUE(answered(*node, *writer, *reader));
+}
+
 /// However many keys a stranger has, nobody ends or fills up, and those that are known are heard again.
 TEST_P(Process, AStrangerWithAHordeOfKeysEndsNobody) {
   const auto [here, there, domain] = GetParam();
@@ -198,8 +227,11 @@ INSTANTIATE_TEST_SUITE_P(Vendors, Process,
 
 int main(int argc, char** argv) {
   const std::string_view role = argv[0];
-  if (argc == 3 && (role == "peer" || role == "crowd" || role == "swarm")) {
-    const auto live = role == "peer" ? hamel::answer : role == "crowd" ? hamel::crowd : hamel::swarm;
+  if (argc == 3 && (role == "peer" || role == "crowd" || role == "swarm" || role == "glance")) {
+    const auto live = role == "peer"    ? hamel::answer
+                      : role == "crowd" ? hamel::crowd
+                      : role == "swarm" ? hamel::swarm
+                                        : hamel::glance;
     live(hamel::bus::vendor_from(argv[1]).value(), static_cast<std::uint32_t>(std::atoi(argv[2])));
   }
   testing::InitGoogleTest(&argc, argv);
