@@ -86,8 +86,7 @@ struct Scene {
     load.pushed = true;
     from.place(chain, VectorXd::Constant(n, 0.1));
     from.move_with_velocity(chain, VectorXd::Constant(n, 0.1));
-    const VectorXd p = from.p;
-    from.move_with_momentum(chain, p);
+    from.move_with_momentum(chain);
   }
   typename G::Chain chain;
   Options options;
