@@ -78,7 +78,7 @@ MUTANTS = [
            "R = level(chain_.gravity_W);\n    for (int j = 0; j <= i; ++j) R = attitude(X[at(j)], &R);\n    R_[at(i)] = R;",
            "blocks_test", "*Jacobian*"),
     Mutant("solution_in_squares", "operations of forward dynamics are linear in n", "common/rbd/sweeps.h",
-           "add_along(chain[i], X[i], a, x[i]);\n  }", "add_along(chain[i], X[i], a, x[i]);\n    for (int j = 0; j < i; ++j) x[j] = u[j] - (u[j] - x[j]);\n  }",
+           "add_along(chain[i], X[i], a, x);\n  }", "add_along(chain[i], X[i], a, x);\n    for (int j = 0; j < i; ++j) a = to_child(X[i], a);\n  }",
            "blocks_test", "*ForwardDynamics*"),
     Mutant("any_drift", "steps that add to a drift are refused", CORE + "marcher.cpp", "kDrift = 0.25,", "kDrift = 0.5,",
            "guards_test", "Ledger.*"),

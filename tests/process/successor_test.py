@@ -103,7 +103,7 @@ class Lockstep(unittest.TestCase):
                 self.assertGreaterEqual(there["restarts"], 1, err)
 
     def test_a_perception_that_is_killed_in_the_middle_of_a_stream_changes_nothing(self):
-        long = [scene("panda_person"), "--lockstep", "--set", "stop=at_duration", "--duration", 12]
+        long = [scene("panda_person"), "--lockstep", "--set", "stop=at_duration", "--duration", 30]
         _, here = outcome("run", *long)
         with Up(*long, "--domain", 93) as up:
             up.child("dynamics")
@@ -111,7 +111,7 @@ class Lockstep(unittest.TestCase):
                 time.sleep(0.7)
                 os.kill(up.child("perception"), signal.SIGKILL)
             code, there, err = up.end()
-        self.assertEqual((there["steps"], there["trajectory_hash"]), (12000, here["trajectory_hash"]), err)
+        self.assertEqual((there["steps"], there["trajectory_hash"]), (30000, here["trajectory_hash"]), err)
         self.assertGreaterEqual(there["restarts"], 1, err)
 
     def test_who_starts_first_changes_nothing(self):

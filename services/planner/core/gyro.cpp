@@ -13,6 +13,9 @@ namespace hamel::planner {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
+/// How much of its press at rest a moving point presses with at most.
+constexpr double kMostPress = 1.5;
+
 Vector3d plane_axis(const model::Chain& chain) noexcept {
   Vector3d axis = Vector3d::Zero();
   Eigen::Matrix3d R_WB = chain.X_WB0().R;
@@ -151,8 +154,8 @@ bool Gyro::add_circulation(Pairs& pairs, Memory& memory, double t_s, double kc, 
   for (std::size_t k = 0; k < items.size(); ++k) {
     Pair& pair = items[k];
     const HeldTurn* turn = held_turn(memory, pair.obstacle, t_s);
-    const double press =
-        std::min(pair.n.dot(pairs.J(k).lazyProduct(qdd_att)), pair.n.dot(pairs.J(k).lazyProduct(qdd_rest)));
+    const double press = std::min(pair.n.dot(pairs.J(k).lazyProduct(qdd_att)),
+                                  kMostPress * pair.n.dot(pairs.J(k).lazyProduct(qdd_rest)));
     if (!turn || !(press > 0)) continue;
     pressed = true;
     const double strength = kc * smooth_step(1 - pair.d / options_.rho0_m) * press;

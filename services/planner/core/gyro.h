@@ -28,13 +28,12 @@ class Gyro {
   ///                      step for who moves with the obstacle
   void add(const Arm& arm, Pairs& pairs, double dt_s, Eigen::VectorXd& tau) noexcept;
 
-  /// tau += J^T Lam (kc S(1 - d/rho0) press e_c x n), press = max(0, n . J qdd_att, where n . J qdd_rest is
-  /// not less): slides along what it presses on, in the direction held for that obstacle.  planner.md 1.8.
-  /// True where some pair pressed.
+  /// tau += J^T Lam (kc S(1 - d/rho0) press e_c x n), press = max(0, min(n . J qdd_att, 3/2 n . J qdd_rest)):
+  /// slides along what it presses on, in the direction held for that obstacle.  planner.md 1.8.  True where
+  /// some pair pressed.
   /// @param qdd_rest  what qdd_att would be at rest.  Without it a point that leaves an obstacle, and is
-  /// braked
-  ///                  for that, would press on it the more the faster it goes: circulation fed on its own
-  ///                  speed, up to 25 m/s where vmax was 1.
+  ///                  braked for that, would press on it the more the faster it goes: circulation fed on its
+  ///                  own speed, up to 25 m/s where vmax was 1.
   bool add_circulation(Pairs& pairs, Memory& memory, double t_s, double kc, const Eigen::VectorXd& qdd_att,
                        const Eigen::VectorXd& qdd_rest, Eigen::VectorXd& tau) noexcept;
 
