@@ -55,6 +55,35 @@ std::vector<Candidate> candidates(const Robot& robot, int link, double most_m) {
   return out;
 }
 
+/// For each shape those it is watched against.  Shapes that locked joints brought onto one link differ in it:
+/// neighbours of what one of them is watched against would be found touching as part of the other.
+std::vector<std::vector<std::size_t>> watched_against(const Robot& robot) {
+  std::vector<std::vector<std::size_t>> out(robot.shapes.size());
+  for (const auto& [a, b] : robot.self_pairs) out[a].push_back(b), out[b].push_back(a);
+  for (std::vector<std::size_t>& others : out) std::sort(others.begin(), others.end());
+  return out;
+}
+
+/// Puts those together that may be; says for each which it became part of, and by how much they grew.
+double put_together(Robot& robot, const std::vector<Candidate>& all, double most_m,
+                    std::vector<std::size_t>& stands_for) {
+  double excess = 0;
+  std::vector<Capsule> members;
+  for (const Candidate& c : all) members.push_back(c.capsule);
+  const std::vector<double> room(members.size(), most_m);
+  const std::vector<std::size_t> first_of = geometry::group(members, room);
+  const std::vector<Capsule> grown = hulls(members, first_of);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    stands_for[all[i].shape] = all[first_of[i]].shape;
+    LinkShape& s = robot.shapes[all[i].shape];
+    const bool same = is_round(s.shape) && std::count(first_of.begin(), first_of.end(), i) == 1;
+    if (first_of[i] != i || same) continue;
+    to_shape(grown[i], s.shape, s.X_LS);
+    excess = std::max(excess, grown[i].excess_m);
+  }
+  return excess;
+}
+
 }  // namespace
 
 double simplify_shapes(Robot& robot, double most_m) {
@@ -62,20 +91,16 @@ double simplify_shapes(Robot& robot, double most_m) {
   const std::size_t count = robot.shapes.size();
   std::vector<std::size_t> stands_for(count);  // the shape that a shape became part of
   for (std::size_t k = 0; k < count; ++k) stands_for[k] = k;
+  const std::vector<std::vector<std::size_t>> watched = watched_against(robot);
   for (int link = kLockedOn; link < robot.chain.n(); ++link) {
-    const std::vector<Candidate> all = candidates(robot, link, most_m);
-    std::vector<Capsule> members;
-    for (const Candidate& c : all) members.push_back(c.capsule);
-    const std::vector<double> room(members.size(), most_m);
-    const std::vector<std::size_t> first_of = geometry::group(members, room);
-    const std::vector<Capsule> grown = hulls(members, first_of);
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      stands_for[all[i].shape] = all[first_of[i]].shape;
-      LinkShape& s = robot.shapes[all[i].shape];
-      const bool same = is_round(s.shape) && std::count(first_of.begin(), first_of.end(), i) == 1;
-      if (first_of[i] != i || same) continue;
-      to_shape(grown[i], s.shape, s.X_LS);
-      excess = std::max(excess, grown[i].excess_m);
+    std::vector<Candidate> rest = candidates(robot, link, most_m);
+    while (!rest.empty()) {
+      const std::size_t first = rest.front().shape;
+      const auto end = std::stable_partition(
+          rest.begin(), rest.end(), [&](const Candidate& c) { return watched[c.shape] == watched[first]; });
+      const std::vector<Candidate> alike(rest.begin(), end);
+      rest.erase(rest.begin(), end);
+      excess = std::max(excess, put_together(robot, alike, most_m, stands_for));
     }
   }
   std::vector<std::size_t> place(count);

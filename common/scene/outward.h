@@ -10,7 +10,8 @@
 namespace hamel::scene {
 
 /// Boxes and cylinders of the links become capsules, and capsules and spheres of one link (a sphere tree)
-/// fewer capsules, wherever that reaches no more than `most_m` beyond them.  Robot::self_pairs follow.
+/// fewer capsules, wherever that reaches no more than `most_m` beyond them; only those that are watched
+/// against the same shapes go together.  Robot::self_pairs follow.
 /// @return the largest excess [m]; 0 where nothing changed
 double simplify_shapes(Robot& robot, double most_m);
 

@@ -148,7 +148,8 @@ void note_obstacles(Scene& s) {
   const int n = s.robot.chain.n();
   sizes(note(s, "links", skip && far > 0,
              count(skip ? far : 0, "links not asked for distances while others are nearer"),
-             !skip     ? "fidelity: fastest would; commands stay the same, but their report shows no distance"
+             s.reduce.links == Choice::off ? "forbidden"
+             : !skip   ? "fidelity: fastest would; commands stay the same, but their report shows no distance"
              : far > 0 ? "no standing obstacle comes within rho0 of them; their report shows none"
                        : "standing obstacles may come within rho0 of every link, or there are none"),
         n, n - static_cast<int>(skip ? far : 0), "links");

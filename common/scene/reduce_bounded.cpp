@@ -19,7 +19,11 @@ constexpr double kSlowestCycle_s = 0.01;
 constexpr double kHurry = 1.5;
 constexpr double kOvershoot =
     2;  // the bound goes by it: room for what the arm speeds up in one written period
-const std::string kWouldBe = "fidelity: fastest would";
+
+/// Why what nobody wants is not done.
+std::string unwanted(Choice choice, const std::string& would = "") {
+  return choice == Choice::off ? "forbidden" : "fidelity: fastest would" + would;
+}
 
 Reduction& note_bounded(Scene& s, const std::string& name, bool on, const std::string& what,
                         const std::string& why) {
@@ -42,7 +46,7 @@ void note_merge(Scene& s) {
       s, "merge", on, count(all.size() - merged.size(), "standing obstacles that become part of others"),
       on     ? "capsules around them reach no farther than the bound; each set is looked at once"
       : wish ? "no capsules around some reach as little beyond them as asked"
-             : kWouldBe + " look for some");
+             : unwanted(s.reduce.merge, " look for some"));
   sizes(r, static_cast<double>(all.size()), static_cast<double>(merged.size()), "obstacles");
   // Of what comes within rho0; farther off it grows in proportion.
   r.bound = on ? std::min(moving ? kInf : merge.excess_m(), s.accuracy.obstacle_error_m) : 0;
@@ -76,7 +80,7 @@ void reduce_rate(Scene& s) {
       note_bounded(s, "rate", on, on ? "obstacle sets published less often" : "obstacle sets as written",
                    !less ? "the obstacles' motion, or their staleness, needs " + number(needed) + " Hz"
                    : on  ? "carried on with their velocities they stay within the bound"
-                         : kWouldBe);
+                         : unwanted(s.reduce.rate));
   sizes(r, before, s.perception.rate_hz, "Hz");
   for (const ScriptedObstacle& o : s.perception.obstacles)
     r.bound = std::max(r.bound, on ? carried_error_m(o, 1 / s.perception.rate_hz) : 0);
@@ -123,7 +127,7 @@ void note_step(Scene& s) {
   const bool on = wanted(s.reduce, s.reduce.step, false);
   Reduction& r = note_bounded(s, "step", false, "tier and step as written",
                               on ? "chosen by hamel run, up, batch or explain, and not yet"
-                                 : kWouldBe + " choose them for the accuracy");
+                                 : unwanted(s.reduce.step, " choose them for the accuracy"));
   sizes(r, s.dynamics.dt_s, s.dynamics.dt_s, "s");
   r.bound_unit = std::string("rad");
   r.live = true;
@@ -145,9 +149,9 @@ void reduce_shapes(Scene& s) {
   if (on) s.robot = std::move(simpler);
   Reduction& r = note_bounded(s, "shapes", on && excess > 0,
                               count(before - after, "link shapes that become part of others"),
-                              excess == 0 ? "no simpler ones reach as little beyond them as asked"
-                              : on        ? "capsules around them reach no farther than the bound"
-                                          : kWouldBe);
+                              !on           ? unwanted(s.reduce.shapes)
+                              : excess == 0 ? "no simpler ones reach as little beyond them as asked"
+                                            : "capsules around them reach no farther than the bound");
   sizes(r, static_cast<double>(before), static_cast<double>(on ? after : before), "shapes");
   r.bound = on ? excess : 0;
   r.live = r.in_force;

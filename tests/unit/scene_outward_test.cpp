@@ -116,10 +116,26 @@ TEST(Shapes, KeepWhichPairsAreWatched) {
         {link, {geometry::ShapeKind::sphere, {0.1, 0, 0}}, {Eigen::Matrix3d::Identity(), {0, 0, z}}});
   };
   ball(0, 0), ball(1, 0), ball(0, 0.01), ball(1, 0.01), ball(1, 5);
-  robot.self_pairs = {{0, 1}, {2, 3}, {0, 4}};
+  robot.self_pairs = {{0, 1}, {0, 3}, {0, 4}, {2, 1}, {2, 3}, {2, 4}};
   EXPECT_GT(simplify_shapes(robot, 1e-2), 0);
   ASSERT_EQ(robot.shapes.size(), 3u);
   const std::vector<std::pair<std::size_t, std::size_t>> expected{{0, 1}, {0, 2}};
+  EXPECT_EQ(robot.self_pairs, expected);
+}
+
+/// A locked joint makes one link of two: what only one of them was watched against stays so.
+TEST(Shapes, OfTwoLinksThatALockedJointJoinedStayApart) {
+  test::Random rng(59);
+  Scene s = test::random_scene(rng, false, 0);
+  Robot& robot = s.robot;
+  robot.shapes.clear();
+  for (const auto& [link, z] : {std::pair{0, 0.0}, {0, 0.01}, {1, 0.1}, {0, 0.011}})
+    robot.shapes.push_back(
+        {link, {geometry::ShapeKind::sphere, {0.1, 0, 0}}, {Eigen::Matrix3d::Identity(), {0, 0, z}}});
+  robot.self_pairs = {{0, 2}};  // 1 and 3 touch their neighbour 2 by design
+  EXPECT_GT(simplify_shapes(robot, 1e-2), 0);
+  ASSERT_EQ(robot.shapes.size(), 3u);
+  const std::vector<std::pair<std::size_t, std::size_t>> expected{{0, 2}};
   EXPECT_EQ(robot.self_pairs, expected);
 }
 
