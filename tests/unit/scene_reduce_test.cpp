@@ -336,6 +336,22 @@ TEST(Reductions, AreForbiddenAndForced) {
 }
 
 /// Of the base only what moves matters; what locked joints made part of it keeps its nearest obstacle.
+TEST(Reductions, ThatAreForbiddenSaySo) {
+  test::Random rng(61);
+  for (const Fidelity fidelity : {Fidelity::exact, Fidelity::fastest})
+    for (const char* name : {"shapes", "links", "merge", "rate", "step"}) {
+      Scene s = test::random_scene(rng, true, 4);
+      s.steered = true;
+      s.perception.rate_hz = 1e4;  // more than any motion needs
+      s.reduce.fidelity = fidelity;
+      for (const NamedChoice& c : choices())
+        if (name == std::string(c.name)) s.reduce.*c.choice = Choice::off;
+      reduce(s);
+      EXPECT_FALSE(find(s, name).in_force) << name;
+      EXPECT_EQ(find(s, name).why, "forbidden") << name;
+    }
+}
+
 TEST(Obstacles, NearestToWhatIsLockedOntoTheBaseStay) {
   test::Random rng(11);
   Scene s = test::random_scene(rng, false, 0);
