@@ -118,7 +118,7 @@ Done run_one(const std::string& scene_path, const std::vector<std::string>& comm
              std::size_t i) {
   std::vector<std::string> overrides = common;
   for (std::string& o : v.overrides(i)) overrides.push_back(std::move(o));
-  const auto scene = files::load_scene(scene_path, overrides);
+  const auto scene = load_chosen(scene_path, overrides);
   if (!scene) return {"", scene.error()};
   return {row(v, i, run_variation(scene.value())), {}};
 }
@@ -155,7 +155,7 @@ int batch(const BatchArgs& args) {
         return runtime::complain("hamel batch", {{"--set " + set, "varies in " + args.path}});
   if (const auto p = output_problem("-o", args.out_path, {args.path, o.scene_path}))
     return runtime::complain("hamel batch", {*p});
-  const auto scene = load_chosen(o);
+  const auto scene = runtime::load(o);
   if (!scene) return runtime::complain("hamel batch", scene.error());
 
   std::unique_ptr<Journal> journal;

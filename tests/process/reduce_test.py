@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """`hamel explain`, `hamel batch` and the reductions of a run, as a user meets them."""
 
+import csv
 import json
 import os
 import pathlib
@@ -158,6 +159,19 @@ class Batch(unittest.TestCase):
         _, o = outcome("run", scene("four_link_avoid"), "--duration", "1", "--set", "planner.kobs=8",
                        "--set", "perception.obstacles[0].position_m[0]=2.6")
         self.assertEqual(last["trajectory_hash"], o["trajectory_hash"])
+
+    def test_each_variation_has_the_step_that_run_chooses_for_it(self):
+        fast = self.path / "fast.csv"
+        fast.write_text("fidelity,qd0\nexact,\"[0, 0, 0]\"\nfastest,\"[0, 0, 0]\"\nfastest,\"[20, -30, 40]\"\n")
+        out = self.path / "fast_table.csv"
+        code, _, err = hamel("batch", fast, "--scene", scene("three_link_swing"), "--set", "duration_s=10", "-o", out)
+        self.assertEqual(code, 0, err)
+        hashes = [row["trajectory_hash"] for row in csv.DictReader(out.read_text().splitlines())]
+        runs = [outcome("run", scene("three_link_swing"), "--set", "duration_s=10", "--set", f"fidelity={f}",
+                        "--set", f"qd0={v}")[1]["trajectory_hash"]
+                for f, v in (("exact", "[0, 0, 0]"), ("fastest", "[0, 0, 0]"), ("fastest", "[20, -30, 40]"))]
+        self.assertEqual(hashes, runs)
+        self.assertEqual(len(set(runs)), 3)
 
     def test_killed_it_goes_on_to_the_same_table(self):
         whole, _ = self.run_batch("whole.csv")
