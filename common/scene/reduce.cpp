@@ -188,7 +188,9 @@ std::span<const NamedChoice> choices() noexcept { return kChoices; }
 std::vector<std::string> refused(const Scene& s) {
   std::vector<std::string> out;
   for (const NamedChoice& c : kChoices) {
-    if (s.reductions.empty() || s.reduce.*c.choice != Choice::on) continue;
+    // Of all that `fastest` looks for, tier and step alone are a promise: the scene's accuracy.
+    const bool promised = std::string(c.name) == "step" && wanted(s.reduce, s.reduce.step, false);
+    if (s.reductions.empty() || (s.reduce.*c.choice != Choice::on && !promised)) continue;
     const auto r = std::find_if(s.reductions.begin(), s.reductions.end(),
                                 [&](const Reduction& x) { return x.name == c.name; });
     if (r == s.reductions.end())

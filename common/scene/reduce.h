@@ -47,7 +47,8 @@ struct NamedChoice {
 };
 std::span<const NamedChoice> choices() noexcept;
 
-/// What was asked for by `on` and is not in force: "merge: no capsules around ...", name and reason.
+/// What was asked for by `on`, or tier and step for the accuracy by `fidelity: fastest`, and is not in force:
+/// "merge: no capsules around ...", name and reason.
 std::vector<std::string> refused(const Scene& s);
 
 /// True where an option's reduction is to be in force.

@@ -103,6 +103,10 @@ class Fastest(unittest.TestCase):
         self.assertRegex(out, r"asked for, but +locked: no joint is locked\n")
         _, out, _ = hamel("explain", scene("panda_reach"), "--seconds", "0.02", *asked)
         self.assertIn("Asked for, but plane: revolute axes are not all parallel", out)
+        for asked, said in (("1e-3", []), ("1e-15", ["step: nothing tried keeps to the accuracy"])):
+            _, o = outcome("run", scene("three_link_swing"), "--set", "duration_s=10", "--set", "fidelity=fastest",
+                           "--set", f"accuracy.joint_error_rad={asked}")
+            self.assertEqual(o["asked_for_but"], said)
 
     def test_costs_are_those_of_what_was_chosen(self):
         code, out, _ = hamel("explain", scene("panda_reach"), "--json", "--seconds", "0.1", "--set", "fidelity=fastest")
