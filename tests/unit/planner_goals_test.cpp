@@ -6,6 +6,7 @@
 #include "services/planner/core/pairs.h"
 #include "services/planner/core/reachable.h"
 #include "tests/support/planner_scene.h"
+#include "tests/support/soak.h"
 
 namespace hamel::planner {
 namespace {
@@ -148,7 +149,7 @@ TEST(Goals, ApproachEndsAmongObstacles) {
   test::Random rng(17);
   scene::PlannerOptions o = planar_options();
   o.unreachable = scene::Unreachable::approach;
-  for (int k = 0; k < 10; ++k) {
+  for (int k = 0; k < (test::kSanitized ? 3 : 10); ++k) {
     std::vector<geometry::Obstacle> seen;
     for (std::uint32_t i = 1; i <= 4; ++i)
       seen.push_back(test::sphere(i, {rng.uniform(1, 4), rng.uniform(1, 4), 0}, 0.2));
