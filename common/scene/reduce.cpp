@@ -148,8 +148,7 @@ void note_obstacles(Scene& s) {
   const int n = s.robot.chain.n();
   sizes(note(s, "links", skip && far > 0,
              count(skip ? far : 0, "links not asked for distances while others are nearer"),
-             s.reduce.links == Choice::off ? "forbidden"
-             : !skip   ? "fidelity: fastest would; commands stay the same, but their report shows no distance"
+             !skip ? unwanted(s.reduce.links, "; commands stay the same, but their report shows no distance")
              : far > 0 ? "no standing obstacle comes within rho0 of them; their report shows none"
                        : "standing obstacles may come within rho0 of every link, or there are none"),
         n, n - static_cast<int>(skip ? far : 0), "links");
@@ -189,7 +188,7 @@ std::vector<std::string> refused(const Scene& s) {
   std::vector<std::string> out;
   for (const NamedChoice& c : kChoices) {
     // Of all that `fastest` looks for, tier and step alone are a promise: the scene's accuracy.
-    const bool promised = std::string(c.name) == "step" && wanted(s.reduce, s.reduce.step, false);
+    const bool promised = c.choice == &Options::step && wanted(s.reduce, s.reduce.step, false);
     if (s.reductions.empty() || (s.reduce.*c.choice != Choice::on && !promised)) continue;
     const auto r = std::find_if(s.reductions.begin(), s.reductions.end(),
                                 [&](const Reduction& x) { return x.name == c.name; });

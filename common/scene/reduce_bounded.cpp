@@ -20,11 +20,6 @@ constexpr double kHurry = 1.5;
 constexpr double kOvershoot =
     2;  // the bound goes by it: room for what the arm speeds up in one written period
 
-/// Why what nobody wants is not done.
-std::string unwanted(Choice choice, const std::string& would = "") {
-  return choice == Choice::off ? "forbidden" : "fidelity: fastest would" + would;
-}
-
 Reduction& note_bounded(Scene& s, const std::string& name, bool on, const std::string& what,
                         const std::string& why) {
   Reduction& r = note(s, name, on, what, why);

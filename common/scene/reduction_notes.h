@@ -27,6 +27,11 @@ inline void sizes(Reduction& r, double before, double after, const std::string& 
   r.unit = unit;
 }
 
+/// Why what is done for `fidelity: fastest` alone, and now not wanted, is not done.
+inline std::string unwanted(Choice choice, const std::string& would = "") {
+  return choice == Choice::off ? "forbidden" : "fidelity: fastest would" + would;
+}
+
 /// The scene's obstacles that stand still, as perception will publish them.
 std::vector<geometry::Obstacle> standing(const Scene& s);
 

@@ -128,6 +128,8 @@ MUTANTS = [
            "across > 1e-3 * g.norm()", "scene_reduce_test", "*Gantry*"),
     Mutant("sets_too_seldom", "obstacles carried on stay within the bound", "common/scene/reduce_bounded.cpp", "return 0.5 * turn * turn *",
            "return 0.25 * turn * turn *", "scene_reduce_test", "Rate.*"),
+    Mutant("shapes_of_two_links", "shapes watched against others than each other's stay apart", "common/scene/outward.cpp",
+           "return watched[c.shape] == watched[first];", "return c.shape + 1 > first;", "scene_outward_test", "Shapes.*"),
     Mutant("cycles_never_hurry", "cycles as often as written while a point is fast", "common/scene/cadence.cpp", "<= hurry_mps_);",
            "<= 2 * hurry_mps_);", "scene_outward_test", "Cycle.*"),
     Mutant("locked_on_is_base", "what is locked onto the base keeps its nearest", "common/scene/reach.cpp", "nearest_m_[n] = -inf;",

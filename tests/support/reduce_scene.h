@@ -1,6 +1,7 @@
 #pragma once
 /// Random scenes that have something to leave out.
 
+#include <stdexcept>
 #include <string>
 
 #include "common/scene/scene.h"
@@ -90,6 +91,13 @@ inline scene::Scene random_scene(Random& rng, bool planar, double locked) {
     s.perception.obstacles.back().at_start.X_WO.p += s.robot.chain.X_WB0().p;
   }
   return s;
+}
+
+/// What reduce() says of one reduction.
+inline const scene::Reduction& find(const scene::Scene& s, const std::string& name) {
+  for (const scene::Reduction& r : s.reductions)
+    if (r.name == name) return r;
+  throw std::out_of_range(name);
 }
 
 }  // namespace hamel::test

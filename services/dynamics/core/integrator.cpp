@@ -126,7 +126,10 @@ class Arm final : public Integrator::Impl {
   /// Takes tau as far as the joints give it; how many give less.
   int cut(const double* tau) noexcept {
     double* given = load_.tau.data();
-    if (!weak_) return std::copy_n(tau, axis_.n(), given), 0;
+    if (!weak_) {
+      std::copy_n(tau, axis_.n(), given);
+      return 0;
+    }
     int count = 0;
     for (const model::JointLimits& limits : limits_) {
       *given = std::clamp(*tau, -limits.effort, limits.effort);
